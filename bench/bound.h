@@ -1,0 +1,37 @@
+#pragma once
+// The least that a step of training can cost: work that no implementation avoids, at the rate that
+// bare kernels reach here. Contains no timing of our own layers.
+
+#include <string>
+#include <vector>
+
+#include "base/types.h"
+#include "harness/config.h"
+
+namespace o2v::bench {
+
+/// A matrix product C (m, n) += A (m, k) B (k, n), `per_step` times an environment step.
+struct Product {
+  std::string what;
+  Index m, k, n;
+  double per_step;
+
+  double MflopPerStep() const { return 2e-6 * double(m) * double(k) * double(n) * per_step; }
+};
+
+/// The products of inference, values and update that cannot be skipped, after all that is shared by
+/// the batch (keys, values, tables of the K embeddings) has been taken out of it. First layers need
+/// no input gradient; the action stage of `paper` needs no option policy, that of `released` its
+/// forward pass.
+std::vector<Product> Products(const RunConfig& config, int S, int A);
+
+/// Entries that Adam visits an environment step.
+double AdamEntriesPerStep(const RunConfig& config, int S, int A);
+
+/// CPU seconds of one bare Eigen product of these shapes on data that stays in cache; measured
+/// once.
+double ProductSeconds(Index m, Index k, Index n);
+/// CPU seconds an entry of clipping and Adam as memory passes over flat arrays; measured once.
+double AdamSecondsPerEntry();
+
+}  // namespace o2v::bench

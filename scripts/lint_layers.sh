@@ -1,0 +1,39 @@
+#!/bin/sh
+# Checks that a file of src/ includes only its own folder and folders below it, and that the headers
+# of third parties stay where they are confined.
+set -eu
+cd "$(dirname "$0")/.."
+
+find src -name '*.cc' -o -name '*.h' | sort | xargs awk '
+  BEGIN {
+    # What a folder may include beside itself.
+    may["base"] = " "
+    may["nn"] = may["dist"] = may["env"] = " base "
+    may["rollout"] = " base nn dist env "
+    may["algo"] = may["rollout"] "rollout "
+    may["harness"] = may["algo"] "algo embedded build_info.h "
+    may["cli"] = may["harness"] "harness "
+    may["env"] = may["env"] "embedded "
+    # Where third-party headers may appear; Eigen and the standard library may appear anywhere.
+    home["mujoco"] = "^src/env/"
+    home["toml++"] = "^src/harness/config\\.cc$"
+    home["nlohmann"] = "^src/harness/(manifest|checkpoint)\\.cc$"
+    home["CLI"] = "^src/cli/"
+  }
+  /^[ \t]*#[ \t]*include[ \t]*"/ {
+    split(FILENAME, path, "/")
+    header = $0; sub(/^[^"]*"/, "", header); sub(/".*/, "", header)
+    split(header, part, "/")
+    if (part[1] != path[2] && !index(may[path[2]], " " part[1] " ")) {
+      print FILENAME ":" FNR ": " path[2] "/ must not include " header; bad = 1
+    }
+  }
+  /^[ \t]*#[ \t]*include[ \t]*</ {
+    header = $0; sub(/^[^<]*</, "", header); sub(/>.*/, "", header)
+    split(header, part, "/")
+    if (part[1] in home && FILENAME !~ home[part[1]]) {
+      print FILENAME ":" FNR ": " header " is confined to " home[part[1]]; bad = 1
+    }
+  }
+  END { exit bad }
+'

@@ -1,0 +1,98 @@
+#pragma once
+// What a learning method is to everybody else.
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "algo/switches.h"
+#include "base/settings.h"
+#include "base/state.h"
+#include "nn/param.h"
+#include "rollout/batch.h"
+#include "rollout/vec_env.h"
+
+namespace o2v {
+
+/// Everything that a method is made from.
+struct AlgorithmInput {
+  int S = 0, A = 0;                 // sizes of the task
+  int workers = 1;                  // N
+  const Settings* hyper = nullptr;  // hyper-parameters: keys of paper_configs/algo/<method>.toml
+  Switches switches;
+  std::uint64_t seed = 0;  // of all its random streams
+};
+
+/// Terms of a stage's loss on one batch, as optimised: total is what the gradients belong to.
+struct LossTerms {
+  double total = 0;
+  double surrogate = 0;  // clipped surrogate, with its minus sign
+  double value = 0;      // with the factor 1/2
+  double entropy = 0;    // mean entropy, positive for a distribution
+  double kl = 0;         // mean of r - 1 - ln r, r the probability ratio (Schulman's k3 estimate)
+  double clip_fraction = 0;  // share of samples with a ratio outside [1-c, 1+c]
+};
+
+/// Random choices inside a loss, given instead of drawn. Used by gradient checks and oracles.
+struct FixedDraws {
+  std::vector<int> o;        // (B) options fed to action net and critic; empty: drawn
+  std::vector<Mat> dropout;  // keep masks 0/1 in forward order; empty: drawn
+};
+
+/// A learner: acts on N workers, learns from what came back.
+class Algorithm {
+ public:
+  virtual ~Algorithm() = default;
+
+  /// One rollout. Appends the episodes that ended.
+  virtual void Collect(VecEnv& env, std::vector<Episode>& episodes) = 0;
+  /// All epochs over it. `stats` gets one number for each of StatNames().
+  virtual void Update(std::vector<double>& stats) = 0;
+  /// Columns of updates.csv after `step`.
+  virtual std::vector<std::string> StatNames() const = 0;
+
+  /// All trainable arrays in the order of the network; names as in the checkpoint format.
+  virtual std::vector<Param*> Params() = 0;
+  /// All state that a resumed run needs, the parameters included.
+  virtual void Visit(StateVisitor& v) = 0;
+
+  // ---- What the networks say. Dropout off; options given by the caller.
+
+  /// K; 1 for a method without options.
+  virtual int NumOptions() const = 0;
+  /// s (S, B), o_prev (B), init (B) -> P (K, B), probabilities an option is drawn with.
+  virtual void OptionPolicy(const Mat& s, const std::vector<int>& o_prev,
+                            const std::vector<char>& init, Mat& P) = 0;
+  /// s (S, B), o (B) -> mu, sigma (A, B) of the action's Gaussian.
+  virtual void ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, Mat& sigma) = 0;
+  /// s (S, B), o (B) the option that the critic is fed -> q (K, B).
+  virtual void OptionValues(const Mat& s, const std::vector<int>& o, Mat& q) = 0;
+
+  // ---- Parts of Update, one by one.
+
+  /// Names of the stages: {"high", "low"} for a two-stage method, else {"all"}.
+  virtual std::vector<std::string> Stages() const = 0;
+  /// Loss of a stage on a batch; adds its gradients to Params(). `fixed` may be null.
+  virtual LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) = 0;
+  /// Clips the gradients, steps the optimiser by the stage's idle rule and zeroes the gradients.
+  /// Returns the global norm before clipping.
+  virtual double Step(int stage) = 0;
+  /// The tensors that the stage's loss can reach, by position in Params().
+  virtual std::vector<char> InGraph(int stage) const = 0;
+};
+
+/// A registry line.
+struct AlgorithmEntry {
+  std::string id;
+  std::unique_ptr<Algorithm> (*make)(const AlgorithmInput&);
+};
+
+/// All methods, in the order of list.inc.
+const std::vector<AlgorithmEntry>& AlgorithmRegistry();
+/// Throws ConfigError for an unknown id; the message lists the nearest known ones.
+std::unique_ptr<Algorithm> MakeAlgorithm(const std::string& id, const AlgorithmInput& input);
+
+}  // namespace o2v

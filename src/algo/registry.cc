@@ -1,0 +1,29 @@
+#include "algo/algorithm.h"
+#include "base/check.h"
+#include "base/names.h"
+
+namespace o2v {
+
+#define O2V_ALGO(id, make) std::unique_ptr<Algorithm> make(const AlgorithmInput&);
+#include "algo/list.inc"
+#undef O2V_ALGO
+
+const std::vector<AlgorithmEntry>& AlgorithmRegistry() {
+  static const std::vector<AlgorithmEntry> registry = {
+#define O2V_ALGO(id, make) {id, make},
+#include "algo/list.inc"
+#undef O2V_ALGO
+  };
+  return registry;
+}
+
+std::unique_ptr<Algorithm> MakeAlgorithm(const std::string& id, const AlgorithmInput& input) {
+  std::vector<std::string> known;
+  for (const AlgorithmEntry& entry : AlgorithmRegistry()) {
+    if (entry.id == id) return entry.make(input);
+    known.push_back(entry.id);
+  }
+  throw ConfigError(Concat("unknown algorithm '", id, "'; nearest: ", Nearest(id, known)));
+}
+
+}  // namespace o2v

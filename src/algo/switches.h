@@ -1,0 +1,57 @@
+#pragma once
+// Registry of the switches between the method as written and what the authors' code did.
+
+#include <string>
+#include <vector>
+
+namespace o2v {
+
+/// `paper`: the method as written. `released`: what the authors' code did.
+enum class Fidelity { kPaper, kReleased };
+
+/// Throws ConfigError unless `name` is paper or released.
+Fidelity ParseFidelity(const std::string& name);
+std::string ToString(Fidelity fidelity);
+
+/// All switches of spec 8 that the methods read; each acts in one place, named there.
+struct Switches {
+  Fidelity timelimit = Fidelity::kPaper;             // bootstrap at truncation | terminal
+  double adv_std_eps = 1e-8;                         // added to the advantages' std | 0
+  Fidelity adam_idle = Fidelity::kPaper;             // skip idle tensors | zero-gradient steps
+  Fidelity o2v_option_in_update = Fidelity::kPaper;  // executed | re-drawn
+  Fidelity o2v_init_flag = Fidelity::kPaper;         // init_t | done_t
+  double o2v_dropout = 0;                            // probability: 0 | 0.2
+  Fidelity o2v_critic = Fidelity::kPaper;            // scalar per option | K outputs of drawn o_hat
+  Fidelity o2v_vloss_policy = Fidelity::kPaper;      // P detached | gradient through P
+  Fidelity o2v_init_relu = Fidelity::kPaper;         // linear | ReLU on the initial logits
+  Fidelity o2v_query = Fidelity::kPaper;             // one token | two tokens
+  Fidelity o2v_prev_embed_grad = Fidelity::kPaper;   // on | off
+  double contact_forces = 0;                         // 1 fills cfrc_ext; 0 in both fidelities
+};
+
+/// One line of the registry.
+struct SwitchInfo {
+  std::string name;
+  std::vector<std::string> methods;  // empty: all
+  std::string effect;                // what paper | released do
+  Fidelity Switches::*choice;        // one of the two is set
+  double Switches::*number;
+  double paper, released;  // values of `number`
+  double low, high;        // range of `number`
+
+  bool Concerns(const std::string& method) const;
+};
+
+const std::vector<SwitchInfo>& SwitchRegistry();
+
+/// All switches at the setting of one fidelity.
+Switches SwitchesFor(Fidelity fidelity);
+/// Sets one switch to `paper`, `released` or, where it is numeric, a number. Throws ConfigError for
+/// an unknown name (with the nearest known one), a bad value, or a switch that does not concern
+/// `method`.
+void SetSwitch(Switches& switches, const std::string& method, const std::string& name,
+               const std::string& value);
+/// The setting as text, as SetSwitch reads it: `paper`, `released`, or the number.
+std::string SwitchValue(const Switches& switches, const SwitchInfo& info);
+
+}  // namespace o2v

@@ -1,0 +1,397 @@
+// The program: subcommands, exit codes. 0 success, 1 Error, 2 ConfigError or wrong usage, 3
+// DivergedError.
+
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+#include <iomanip>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "base/files.h"
+#include "base/stats.h"
+#include "env/replay.h"
+#include "harness/checkpoint.h"
+#include "harness/config.h"
+#include "harness/evaluate.h"
+#include "harness/jobs.h"
+#include "harness/summary.h"
+#include "harness/trainer.h"
+
+namespace o2v {
+namespace {
+
+// Set by SIGINT and SIGTERM: a handler can reach nothing else.
+volatile std::sig_atomic_t stop_signal = 0;
+
+/// Options that name a task and a method, of `train`, `eval` and `forward`.
+struct RunOptions {
+  RunRequest request;
+  std::string config;
+
+  void Add(CLI::App& app) {
+    app.add_option("--task", request.task, "task id, see `list tasks`");
+    app.add_option("--algo", request.algorithm, "method id, see `list algorithms`");
+    app.add_option("--fidelity", request.fidelity, "paper (default) or released");
+    app.add_option("--set", request.set, "key=value: number of the method or run, or a switch")
+        ->allow_extra_args(false);
+  }
+};
+
+/// Lines of cells as columns for the eye.
+void PrintTable(const std::vector<std::vector<std::string>>& lines) {
+  std::vector<std::size_t> width(lines[0].size());
+  for (const auto& line : lines) {
+    for (std::size_t i = 0; i < line.size(); ++i) width[i] = std::max(width[i], line[i].size());
+  }
+  for (const auto& line : lines) {
+    for (std::size_t i = 0; i + 1 < line.size(); ++i) {
+      std::cout << std::left << std::setw(static_cast<int>(width[i]) + 2) << line[i];
+    }
+    std::cout << line.back() << "\n";
+  }
+}
+
+// ---- list
+
+void ListTasks() {
+  std::vector<std::vector<std::string>> lines = {{"task", "S", "A", "time limit [steps]"}};
+  for (const EnvEntry& entry : EnvRegistry()) {
+    const EnvSpec spec = MakeEnv(entry.id, {})->Spec();
+    lines.push_back(
+        {spec.id, std::to_string(spec.S), std::to_string(spec.A), std::to_string(spec.time_limit)});
+  }
+  PrintTable(lines);
+}
+
+void ListAlgorithms() {
+  for (const AlgorithmEntry& entry : AlgorithmRegistry()) std::cout << entry.id << "\n";
+}
+
+void ListSwitches() {
+  std::vector<std::vector<std::string>> lines = {
+      {"switch", "paper", "released", "takes", "methods", "effect"}};
+  const Switches paper = SwitchesFor(Fidelity::kPaper);
+  const Switches released = SwitchesFor(Fidelity::kReleased);
+  for (const SwitchInfo& info : SwitchRegistry()) {
+    std::string methods;
+    for (const std::string& method : info.methods) methods += (methods.empty() ? "" : ",") + method;
+    lines.push_back({info.name, SwitchValue(paper, info), SwitchValue(released, info),
+                     info.number ? Concat("paper, released, [", info.low, ", ", info.high, "]")
+                                 : "paper, released",
+                     methods.empty() ? "all" : methods, info.effect});
+  }
+  PrintTable(lines);
+}
+
+void AddList(CLI::App& app) {
+  CLI::App* list = app.add_subcommand("list", "what there is: tasks, algorithms or switches");
+  list->require_subcommand(1);
+  list->add_subcommand("tasks", "task ids, sizes, time limits")->callback(ListTasks);
+  list->add_subcommand("algorithms", "method ids")->callback(ListAlgorithms);
+  list->add_subcommand("switches", "differences between paper and released code, one by one")
+      ->callback(ListSwitches);
+  list->footer("Example:\n  option2vec list switches");
+}
+
+// ---- train
+
+void AddTrain(CLI::App& app) {
+  struct Options : RunOptions {
+    std::string out;
+    bool resume = false;
+  };
+  auto opt = std::make_shared<Options>();
+  CLI::App* train = app.add_subcommand("train", "one run into one folder");
+  opt->Add(*train);
+  train->add_option("--seed", opt->request.seed, "seed of all random streams (default 0)");
+  train->add_option("--steps", opt->request.steps, "environment steps of all workers");
+  train->add_option("--out", opt->out, "folder of the run")->required();
+  train->add_option("--config", opt->config,
+                    "a .toml file, or the name of an embedded one, below --set and the options");
+  train->add_flag("--resume", opt->resume, "go on with an unfinished run, or start a new one");
+  train->footer(
+      "Examples:\n"
+      "  option2vec train --task HalfCheetah-v2 --algo option2vec --seed 1 --out runs/a\n"
+      "  option2vec train --task Hopper-v2 --algo ppo --fidelity released --set hidden=64 "
+      "--steps 200000 --out runs/b\n"
+      "  option2vec train --config runs/a/config.toml --out runs/a --resume");
+  train->callback([opt] {
+    if (!opt->config.empty()) opt->request.config = OpenConfig(opt->config);
+    const RunConfig config = ResolveRun(opt->request);
+    std::signal(SIGINT, [](int signal) { stop_signal = signal; });
+    std::signal(SIGTERM, [](int signal) { stop_signal = signal; });
+    const RunHooks hooks{.stop = [] { return stop_signal != 0; }};
+    const bool terminal = ::isatty(STDERR_FILENO) == 1;
+    if (Train(config, opt->out, opt->resume, std::cerr, terminal, hooks) == RunStatus::kStopped) {
+      throw Error(opt->out + ": stopped by a signal; go on with --resume");
+    }
+  });
+}
+
+// ---- eval, forward
+
+/// A checkpoint's policy on its task.
+struct Policy {
+  std::unique_ptr<Env> env;
+  std::unique_ptr<Algorithm> algorithm;
+  Normalizer normalizer;
+};
+
+/// `request` completes, or repeats, what the file says of itself.
+Policy LoadPolicyFile(const std::string& checkpoint, RunRequest request) {
+  const Metadata metadata = ReadMetadata(checkpoint);
+  if (const auto config = metadata.find("config"); config != metadata.end()) {
+    const RunConfig own = ParseRunConfig(config->second, checkpoint);
+    auto agree = [&](const std::optional<std::string>& given, const std::string& is) {
+      if (given && *given != is) {
+        throw ConfigError(Concat(checkpoint, ": made with '", is, "', not '", *given, "'"));
+      }
+    };
+    agree(request.algorithm, own.algorithm);
+    agree(request.fidelity, ToString(own.fidelity));
+    request.config = ConfigText{checkpoint, config->second};
+  }
+  const RunConfig config = ResolveRun(request);
+  const RunParts parts = PartsOf(config);
+  std::unique_ptr<Env> env = parts.make_env();
+  Policy policy{std::move(env), parts.make_algorithm(env->Spec()), Normalizer(env->Spec().S)};
+  LoadPolicy(checkpoint, *policy.algorithm, policy.normalizer);
+  return policy;
+}
+
+void AddEval(CLI::App& app) {
+  struct Options : RunOptions {
+    std::string checkpoint, action = "sample";
+    int episodes = 10;
+    std::uint64_t seed = 0;
+  };
+  auto opt = std::make_shared<Options>();
+  CLI::App* eval = app.add_subcommand("eval", "returns of a trained policy");
+  eval->add_option("--checkpoint", opt->checkpoint, "last.ckpt of a run, or a foreign file")
+      ->required();
+  opt->Add(*eval);
+  eval->add_option("--episodes", opt->episodes, "whole episodes")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  eval->add_option("--action", opt->action, "sample: from the Gaussian; mean: its mean")
+      ->check(CLI::IsMember({"sample", "mean"}))
+      ->capture_default_str();
+  eval->add_option("--seed", opt->seed, "of the episodes")->capture_default_str();
+  eval->footer(
+      "Task, method, fidelity and --set are needed only where the file does not say them.\n"
+      "Options are always sampled.\n"
+      "Examples:\n"
+      "  option2vec eval --checkpoint runs/a/last.ckpt --task HalfCheetah-v2 --action mean\n"
+      "  option2vec eval --checkpoint foreign.safetensors --task Hopper-v2 --algo ppo "
+      "--fidelity released");
+  eval->callback([opt] {
+    Policy policy = LoadPolicyFile(opt->checkpoint, opt->request);
+    const auto episodes = Evaluate(*policy.algorithm, policy.normalizer, *policy.env, opt->episodes,
+                                   opt->action == "sample", opt->seed);
+    std::vector<double> returns;
+    std::cout << "episode,return,length\n";
+    for (const EvalEpisode& episode : episodes) {
+      std::cout << returns.size() << "," << episode.ret << "," << episode.length << "\n";
+      returns.push_back(episode.ret);
+    }
+    std::cout << "# mean " << Mean(returns) << " +- " << Std(returns) << " (std, n "
+              << returns.size() << ")\n";
+  });
+}
+
+void AddForward(CLI::App& app) {
+  struct Options : RunOptions {
+    std::string checkpoint, input, output;
+  };
+  auto opt = std::make_shared<Options>();
+  CLI::App* forward = app.add_subcommand("forward", "what the networks say at given inputs");
+  forward->add_option("--checkpoint", opt->checkpoint, "last.ckpt of a run, or a foreign file")
+      ->required();
+  opt->Add(*forward);
+  forward->add_option("--input", opt->input, "CSV: s0.. (normalised state), o_prev, init, o")
+      ->required();
+  forward->add_option("--out", opt->output, "CSV: P0.., mu0.., sigma0.., q0..")->required();
+  forward->footer(
+      "Options count from 0; o is fed to action net and critic. Dropout is off.\n"
+      "Example:\n"
+      "  option2vec forward --checkpoint runs/a/last.ckpt --input states.csv --out outputs.csv");
+  forward->callback([opt] {
+    Policy policy = LoadPolicyFile(opt->checkpoint, opt->request);
+    Forward(*policy.algorithm, policy.env->Spec(), opt->input, opt->output);
+  });
+}
+
+// ---- params
+
+/// Parameters of the option network that the baselines share, widths h, at K options. Spec 2.3.
+int OptionNetworkSize(int S, int A, int K, int h) {
+  const int body = (S * h + h) + (h * h + h);
+  return (2 + 2 * K) * body + 2 * (h * K + K) + h * (K + 1) + (K + 1) +
+         K * ((h * A + A) + (h + 1) + A);
+}
+
+void PrintParams(bool csv) {
+  std::vector<std::vector<std::string>> lines = {
+      {"fidelity", "method", "task", "S", "A", "parameters"}};
+  Index cited = 0;  // Option2Vec, released, at the sizes of the paper's claim
+  for (const char* fidelity : {"paper", "released"}) {
+    for (const AlgorithmEntry& method : AlgorithmRegistry()) {
+      for (const EnvEntry& task : EnvRegistry()) {
+        RunRequest request;
+        request.task = task.id;
+        request.algorithm = method.id;
+        request.fidelity = fidelity;
+        const EnvSpec spec = MakeEnv(task.id, {})->Spec();
+        const Index n = CountParams(MakeRunAlgorithm(ResolveRun(request), spec)->Params());
+        if (request.fidelity == "released" && method.id == "option2vec" && spec.S == 17 &&
+            spec.A == 6) {
+          cited = n;
+        }
+        lines.push_back({fidelity, method.id, task.id, std::to_string(spec.S),
+                         std::to_string(spec.A), std::to_string(n)});
+      }
+    }
+  }
+  if (csv) {
+    for (const auto& line : lines) std::cout << CLI::detail::join(line, ",") << "\n";
+    return;
+  }
+  PrintTable(lines);
+  const int option_network = OptionNetworkSize(17, 6, 4, 128);  // HalfCheetah; K and h: spec 2.6
+  std::cout << "\nThe paper's 15.8 %: " << cited << " / " << option_network << " = " << std::fixed
+            << std::setprecision(1) << 100.0 * static_cast<double>(cited) / option_network
+            << " %, Option2Vec (released) against the baselines' option network with 4 options\n"
+               "of width 128, at S = 17, A = 6.\n";
+}
+
+void AddParams(CLI::App& app) {
+  auto csv = std::make_shared<bool>(false);
+  CLI::App* params = app.add_subcommand("params", "number of parameters by method and task");
+  params->add_flag("--csv", *csv, "as CSV");
+  params->footer("Example:\n  option2vec params --csv");
+  params->callback([csv] { PrintParams(*csv); });
+}
+
+// ---- replay
+
+void AddReplay(CLI::App& app, int& exit_code) {
+  struct Options {
+    std::string task, trajectory, out;
+    double tolerance = 1e-9;  // spec/environments.md, traces
+  };
+  auto opt = std::make_shared<Options>();
+  CLI::App* replay = app.add_subcommand("replay", "a recorded trajectory against our simulation");
+  replay->add_option("--task", opt->task, "task id")->required();
+  replay->add_option("--trajectory", opt->trajectory, "CSV: step, ctrl0.., qpos0.., qvel0..")
+      ->required();
+  replay->add_option("--out", opt->out, "our trajectory, same columns");
+  replay->add_option("--tolerance", opt->tolerance, "largest |a - b| / max(1, |b|)")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  replay->footer(
+      "A row with step 0 is injected as the state. Exit code 1 on FAIL.\n"
+      "Example:\n  option2vec replay --task Hopper-v2 --trajectory hopper.csv --out ours.csv");
+  replay->callback([opt, &exit_code] {
+    const Deviation worst = ReplayFile(opt->task, opt->trajectory, opt->out);
+    const bool pass = worst.value <= opt->tolerance;
+    std::cout << (pass ? "PASS" : "FAIL") << ": largest deviation " << worst.value;
+    if (!worst.column.empty()) {
+      std::cout << " in column " << worst.column << ", row " << worst.row;
+    }
+    std::cout << " (tolerance " << opt->tolerance << ")\n";
+    if (!pass) exit_code = 1;
+  });
+}
+
+// ---- jobs, summary
+
+void AddJobs(CLI::App& app, const std::string& program) {
+  struct Options {
+    JobQuery query;
+    std::string seeds;
+  };
+  auto opt = std::make_shared<Options>();
+  opt->query.program = program;
+  CLI::App* jobs = app.add_subcommand("jobs", "the runs of an experiment, one command a line");
+  jobs->add_option("experiment", opt->query.config, "a .toml file, or quick, ci")->required();
+  jobs->add_option("--tasks", opt->query.tasks, "instead of the experiment's, A,B")->delimiter(',');
+  jobs->add_option("--algos", opt->query.algorithms, "likewise")->delimiter(',');
+  jobs->add_option("--fidelity", opt->query.fidelities, "likewise")->delimiter(',');
+  jobs->add_option("--seeds", opt->seeds, "likewise, such as 0-4,7");
+  jobs->add_option("--results", opt->query.results, "folder of all results")->capture_default_str();
+  jobs->footer(
+      "Commands start a run or go on with it; finished and diverged runs are left out and named "
+      "on\n"
+      "standard error.\n"
+      "Example:\n  option2vec jobs quick --seeds 0-4 | xargs -P 2 -d '\\n' -n 1 sh -c");
+  jobs->callback([opt] {
+    if (!opt->seeds.empty()) opt->query.seeds = ParseSeeds(opt->seeds);
+    for (const Job& job : ListJobs(opt->query)) {
+      if (job.finished) {
+        std::cerr << job.dir.string() << ": " << ToString(*job.finished) << "\n";
+      } else {
+        std::cout << job.command << "\n";
+      }
+    }
+  });
+}
+
+void AddSummary(CLI::App& app) {
+  auto folders = std::make_shared<std::vector<std::string>>();
+  CLI::App* summary =
+      app.add_subcommand("summary", "table of an experiment's results beside the authors'");
+  summary->add_option("experiment", *folders, "results/<experiment>")->required();
+  summary->footer(
+      "Also writes <experiment>/summary.csv.\n"
+      "Example:\n  option2vec summary results/quick");
+  summary->callback([folders] {
+    for (const std::string& folder : *folders) {
+      const auto rows = Summarize(folder);
+      WriteFileAtomically(std::filesystem::path(folder) / "summary.csv", SummaryCsv(rows));
+      std::cout << folder << "\n" << SummaryTable(rows) << "\n";
+    }
+  });
+}
+
+int Main(int argc, char** argv) {
+  CLI::App app("Option2Vec and PPO on MuJoCo tasks: reference reproduction.", "option2vec");
+  app.require_subcommand(1);
+  app.footer("option2vec <subcommand> --help shows options and examples.");
+  int exit_code = 0;
+  AddList(app);
+  AddTrain(app);
+  AddEval(app);
+  AddForward(app);
+  AddParams(app);
+  AddReplay(app, exit_code);
+  AddJobs(app, argv[0]);
+  AddSummary(app);
+  auto fail = [](const std::exception& e, int code) {
+    std::cerr << "option2vec: " << e.what() << "\n";
+    return code;
+  };
+  try {
+    app.parse(argc, argv);
+    return exit_code;
+  } catch (const CLI::Success& e) {  // --help
+    return app.exit(e);
+  } catch (const CLI::ParseError& e) {
+    return fail(e, 2);
+  } catch (const ConfigError& e) {
+    return fail(e, 2);
+  } catch (const DivergedError& e) {
+    return fail(e, 3);
+  } catch (const std::exception& e) {
+    return fail(e, 1);
+  }
+}
+
+}  // namespace
+}  // namespace o2v
+
+int main(int argc, char** argv) { return o2v::Main(argc, argv); }

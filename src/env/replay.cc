@@ -1,0 +1,101 @@
+#include "env/replay.h"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "base/check.h"
+#include "base/files.h"
+#include "env/mujoco_env.h"
+
+namespace o2v {
+namespace {
+
+void CheckColumns(const MujocoEnv& env, const CsvTable& table) {
+  std::vector<std::string> expected = {"step"};
+  const auto add = [&](const char* name, std::size_t n) {
+    for (std::size_t i = 0; i < n; ++i) expected.push_back(name + std::to_string(i));
+  };
+  add("ctrl", env.Spec().a_low.size());
+  add("qpos", env.qpos().size());
+  add("qvel", env.qvel().size());
+  for (std::size_t i = 0; i < std::min(expected.size(), table.columns.size()); ++i) {
+    if (table.columns[i] != expected[i]) {
+      throw ConfigError(Concat(table.path, ":1: column ", i + 1, ": expected '", expected[i],
+                               "' for ", env.Spec().id, ", got '", table.columns[i], "'"));
+    }
+  }
+  if (table.columns.size() != expected.size()) {
+    throw ConfigError(
+        Concat(table.path, ":1: expected ", expected.size(), " columns for ", env.Spec().id, " (",
+               table.columns.size() < expected.size()
+                   ? "'" + expected[table.columns.size()] + "' is the first missing one"
+                   : "'" + expected.back() + "' is the last",
+               "), got ", table.columns.size()));
+  }
+}
+
+void CheckSteps(const CsvTable& table) {
+  const std::size_t step = table.Column("step");
+  for (std::size_t row = 0; row < table.Rows(); ++row) {
+    const double next = row == 0 ? 0 : table.At(row - 1, step) + 1;
+    if (table.At(row, step) != 0 && table.At(row, step) != next) {
+      throw ConfigError(Concat(table.Place(row, step), "expected 0 ",
+                               row == 0 ? "" : Concat("or ", next), ", got ", table.At(row, step)));
+    }
+  }
+}
+
+}  // namespace
+
+CsvTable Replay(Env& env, const CsvTable& trajectory) {
+  auto& sim = dynamic_cast<MujocoEnv&>(env);
+  CheckColumns(sim, trajectory);
+  CheckSteps(trajectory);
+  const std::size_t nu = sim.Spec().a_low.size(), nq = sim.qpos().size(), nv = sim.qvel().size();
+  std::vector<double> obs(static_cast<std::size_t>(sim.Spec().S));
+  CsvTable ours = trajectory;
+  for (std::size_t row = 0; row < trajectory.Rows(); ++row) {
+    const std::size_t width = trajectory.columns.size();
+    const std::span<double> out(&ours.values[row * width], width);
+    if (out[0] == 0) {
+      sim.ResetTo(out.subspan(1 + nu, nq), out.last(nv), obs);
+    } else {
+      sim.Step({&ours.values[(row - 1) * width + 1], nu}, obs);
+    }
+    std::ranges::copy(sim.qpos(), out.subspan(1 + nu).begin());
+    std::ranges::copy(sim.qvel(), out.last(nv).begin());
+  }
+  return ours;
+}
+
+Deviation LargestDeviation(const CsvTable& ours, const CsvTable& reference, std::size_t rows) {
+  Check(ours.columns == reference.columns && ours.Rows() == reference.Rows(), reference.path,
+        ": tables of different shape");
+  const std::size_t step = reference.Column("step");
+  Deviation worst;
+  std::size_t first = 0;
+  for (std::size_t row = 0; row < reference.Rows(); ++row) {
+    if (reference.At(row, step) == 0) first = row;
+    if (row - first >= rows) continue;
+    for (std::size_t column = 0; column < reference.columns.size(); ++column) {
+      const double b = reference.At(row, column);
+      double d = std::abs(ours.At(row, column) - b) / std::max(1.0, std::abs(b));
+      if (!std::isfinite(d)) d = std::numeric_limits<double>::infinity();
+      if (d > worst.value) worst = {d, row, reference.columns[column]};
+    }
+  }
+  return worst;
+}
+
+Deviation ReplayFile(const std::string& task, const std::filesystem::path& trajectory,
+                     const std::filesystem::path& out) {
+  const std::unique_ptr<Env> env = MakeEnv(task, EnvOptions{});
+  const CsvTable reference = ReadCsv(trajectory);
+  const CsvTable ours = Replay(*env, reference);
+  if (!out.empty()) WriteFileAtomically(out, CsvText(ours));
+  return LargestDeviation(ours, reference);
+}
+
+}  // namespace o2v

@@ -1,0 +1,47 @@
+#pragma once
+// Checkpoints in the safetensors layout: u64 little-endian length of the header, a JSON header
+// {name: {dtype, shape, data_offsets}}, then the data.
+//
+//   <parameter>       F32, named and shaped as Algorithm::Params(), row-major, vectors (n, 1)
+//   normalizer.mean   F64 (S, 1);  normalizer.var F64 (S, 1);  normalizer.count F64 (1, 1)
+//   training.<name>   all else that a resumed run needs: F32 matrices, F64 and I64 (n, 1)
+//   __metadata__      strings; "checksum" covers the metadata, every tensor's name, type, shape and
+//   data
+//
+// A file is checked whole before anything is changed. Every failure is an Error that names the file
+// and what is wrong with it.
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <string>
+
+#include "algo/algorithm.h"
+#include "base/state.h"
+#include "rollout/normalizer.h"
+
+namespace o2v {
+
+using Metadata = std::map<std::string, std::string>;
+/// Shows all state of a run to a visitor, the algorithm's included.
+using StateWalk = std::function<void(StateVisitor&)>;
+
+/// Writes a checkpoint with WriteFileAtomically. "format" and "checksum" are added to the metadata.
+void SaveCheckpoint(const std::filesystem::path& path, Metadata metadata, Algorithm& algorithm,
+                    const StateWalk& walk, const std::function<void()>& before_rename = {});
+
+/// Restores all state of a run from a file of SaveCheckpoint, which must hold exactly the tensors
+/// that `walk` shows. Returns the metadata that SaveCheckpoint was given.
+Metadata LoadCheckpoint(const std::filesystem::path& path, Algorithm& algorithm,
+                        const StateWalk& walk);
+
+/// The metadata of a file; empty for one from elsewhere that has none.
+Metadata ReadMetadata(const std::filesystem::path& path);
+
+/// Sets parameters and normaliser only. Also takes files from elsewhere: no metadata, no training
+/// state, no normalizer.count, F64 numbers. Every parameter must be there with its shape and finite
+/// values; a name that is neither a parameter, nor of the normaliser, nor training state is
+/// refused.
+void LoadPolicy(const std::filesystem::path& path, Algorithm& algorithm, Normalizer& normalizer);
+
+}  // namespace o2v

@@ -1,0 +1,98 @@
+#include "harness/manifest.h"
+
+#include <Eigen/Core>
+#include <array>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "base/check.h"
+#include "base/files.h"
+#include "build_info.h"
+#include "env/env.h"
+
+namespace o2v {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr std::array<const char*, 4> kStatusNames = {"running", "done", "diverged", "stopped"};
+
+RunStatus ParseStatus(const std::string& name) {
+  for (std::size_t i = 0; i < kStatusNames.size(); ++i) {
+    if (name == kStatusNames[i]) return static_cast<RunStatus>(i);
+  }
+  throw Error("unknown status '" + name + "'");
+}
+
+/// "model name" of the first processor.
+std::string CpuModel() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    const std::size_t colon = line.find(": ");
+    if (line.starts_with("model name") && colon != std::string::npos) return line.substr(colon + 2);
+  }
+  return "unknown";
+}
+
+/// Adds what the program was built from.
+void AddBuild(ordered_json& out) {
+  out["commit"] = kBuildCommit;
+  out["compiler"] = kBuildCompiler;
+  out["flags"] = kBuildFlags;
+  out["versions"] = {
+      {"eigen", Concat(EIGEN_WORLD_VERSION, '.', EIGEN_MAJOR_VERSION, '.', EIGEN_MINOR_VERSION)},
+      {"mujoco", PhysicsVersion()}};
+}
+
+}  // namespace
+
+std::string ToString(RunStatus status) { return kStatusNames[static_cast<std::size_t>(status)]; }
+
+void WriteManifest(const std::filesystem::path& dir, const Manifest& manifest) {
+  ordered_json out = {{"status", ToString(manifest.status)},
+                      {"start", manifest.start},
+                      {"end", manifest.end},
+                      {"steps", manifest.steps},
+                      {"wall_seconds", manifest.wall_seconds},
+                      {"cpu_seconds", manifest.cpu_seconds},
+                      {"cpu", CpuModel()}};
+  AddBuild(out);
+  WriteFileAtomically(dir / "manifest.json", out.dump(2) + "\n");
+}
+
+std::optional<Manifest> ReadManifest(const std::filesystem::path& dir) {
+  const std::filesystem::path path = dir / "manifest.json";
+  if (!std::filesystem::exists(path)) return std::nullopt;
+  try {
+    const ordered_json in = ordered_json::parse(ReadFile(path));
+    Manifest manifest;
+    manifest.status = ParseStatus(in.at("status").get<std::string>());
+    manifest.start = in.at("start").get<std::string>();
+    manifest.end = in.at("end").get<std::string>();
+    manifest.steps = in.at("steps").get<std::int64_t>();
+    manifest.wall_seconds = in.at("wall_seconds").get<double>();
+    manifest.cpu_seconds = in.at("cpu_seconds").get<double>();
+    return manifest;
+  } catch (const std::exception& e) {
+    throw Error(Concat(path.string(), ": cannot be read: ", e.what()));
+  }
+}
+
+std::string RecordJson(const Manifest& manifest, const std::string& config) {
+  ordered_json out = {{"status", ToString(manifest.status)}, {"steps", manifest.steps}};
+  AddBuild(out);
+  out["config"] = config;
+  return out.dump(2) + "\n";
+}
+
+Record ReadRecord(const std::filesystem::path& path) {
+  try {
+    const ordered_json in = ordered_json::parse(ReadFile(path));
+    return {ParseStatus(in.at("status").get<std::string>()), in.at("steps").get<std::int64_t>(),
+            in.at("config").get<std::string>()};
+  } catch (const std::exception& e) {
+    throw Error(Concat(path.string(), ": cannot be read: ", e.what()));
+  }
+}
+
+}  // namespace o2v

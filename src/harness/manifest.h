@@ -1,0 +1,42 @@
+#pragma once
+// manifest.json of a run folder: all that depends on the clock, the machine or the build.
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace o2v {
+
+/// `running` is also what a killed run leaves behind.
+enum class RunStatus { kRunning, kDone, kDiverged, kStopped };
+std::string ToString(RunStatus status);
+
+/// What changes from run to run; commit, compiler, flags, versions and host are added when written.
+struct Manifest {
+  RunStatus status = RunStatus::kRunning;
+  std::string start, end;   // UTC, ISO 8601; end is empty while running
+  std::int64_t steps = 0;   // environment steps of all workers
+  double wall_seconds = 0;  // over all processes that worked on the run
+  double cpu_seconds = 0;
+};
+
+/// Writes `dir`/manifest.json.
+void WriteManifest(const std::filesystem::path& dir, const Manifest& manifest);
+/// The manifest of a run folder, nothing when it has none. Throws Error when it cannot be read.
+std::optional<Manifest> ReadManifest(const std::filesystem::path& dir);
+
+/// What made a record: {"status", "steps", "config" (resolved, TOML), "commit", "compiler",
+/// "flags", "versions"}, as JSON.
+std::string RecordJson(const Manifest& manifest, const std::string& config);
+
+/// The part of a record that a summary needs.
+struct Record {
+  RunStatus status;
+  std::int64_t steps;  // environment steps of all workers
+  std::string config;  // resolved, TOML
+};
+/// Reads a file of RecordJson. Throws Error when it cannot be read.
+Record ReadRecord(const std::filesystem::path& path);
+
+}  // namespace o2v

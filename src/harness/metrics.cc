@@ -1,0 +1,152 @@
+#include "harness/metrics.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "base/check.h"
+#include "base/csv.h"
+#include "base/decimal.h"
+#include "base/files.h"
+#include "base/hash.h"
+
+namespace o2v {
+namespace {
+
+constexpr char kEpisodesHeader[] = "step,worker,return,length,terminated,truncated";
+constexpr int kSmoothing = 20;          // episodes; the authors' plotting scripts
+constexpr std::int64_t kGrid = 10'000;  // [environment steps] ours: 100 rows a million steps
+
+std::string UpdatesHeader(const std::vector<std::string>& stat_names) {
+  std::string header = "step";
+  for (const std::string& name : stat_names) header += "," + name;
+  return header;
+}
+
+}  // namespace
+
+CsvLog::CsvLog(std::filesystem::path path, std::string header)
+    : path_(std::move(path)), header_(std::move(header)) {}
+
+void CsvLog::Append(const std::string& line) {
+  out_ << line;
+  bytes_ += static_cast<std::int64_t>(line.size());
+  hash_ = std::bit_cast<std::int64_t>(Fnv1a(line, std::bit_cast<std::uint64_t>(hash_)));
+}
+
+void CsvLog::Create() {
+  out_.open(path_, std::ios::binary | std::ios::trunc);
+  Check(out_.is_open(), path_.string(), ": cannot be created");
+  bytes_ = 0;
+  hash_ = std::bit_cast<std::int64_t>(Fnv1a(""));
+  Append(header_ + "\n");
+}
+
+void CsvLog::Resume() {
+  const std::string text = ReadFile(path_);
+  const auto size = static_cast<std::int64_t>(text.size());
+  Check(0 <= bytes_ && bytes_ <= size, path_.string(), ": ", size,
+        " bytes, but the checkpoint was written after ", bytes_);
+  const std::string_view kept(text.data(), static_cast<std::size_t>(bytes_));
+  Check(std::bit_cast<std::int64_t>(Fnv1a(kept)) == hash_, path_.string(), ": the first ", bytes_,
+        " bytes are not those that were there when the checkpoint was written");
+  std::filesystem::resize_file(path_, static_cast<std::uintmax_t>(bytes_));
+  out_.open(path_, std::ios::binary | std::ios::app);
+  Check(out_.is_open(), path_.string(), ": cannot be opened for writing");
+}
+
+void CsvLog::Row(std::span<const std::string> cells) {
+  std::string line;
+  for (const std::string& cell : cells) line += (line.empty() ? "" : ",") + cell;
+  Append(line + "\n");
+}
+
+void CsvLog::Flush() {
+  out_.flush();
+  Check(out_.good(), path_.string(), ": cannot write");
+}
+
+void CsvLog::Visit(StateVisitor& v, const std::string& prefix) {
+  v.Int(prefix + ".bytes", bytes_);
+  v.Int(prefix + ".hash", hash_);
+}
+
+RunLogs::RunLogs(const std::filesystem::path& dir, const std::vector<std::string>& stat_names,
+                 bool evals)
+    : episodes_(dir / "episodes.csv", kEpisodesHeader),
+      updates_(dir / "updates.csv", UpdatesHeader(stat_names)) {
+  if (evals) evals_.emplace_back(dir / "evals.csv", "step,episode,return");
+}
+
+void RunLogs::Create() {
+  episodes_.Create();
+  updates_.Create();
+  for (CsvLog& log : evals_) log.Create();
+}
+
+void RunLogs::Resume() {
+  episodes_.Resume();
+  updates_.Resume();
+  for (CsvLog& log : evals_) log.Resume();
+}
+
+void RunLogs::AddEpisode(const Episode& e) {
+  episodes_.Row({Decimal(e.step), Decimal(e.worker), Decimal(e.ret), Decimal(e.length),
+                 Decimal(e.terminated), Decimal(e.truncated)});
+}
+
+void RunLogs::AddUpdate(std::int64_t step, std::span<const double> stats) {
+  std::vector<std::string> cells = {Decimal(step)};
+  for (const double x : stats) cells.push_back(Decimal(x));
+  updates_.Row(cells);
+}
+
+void RunLogs::AddEval(std::int64_t step, int episode, double ret) {
+  for (CsvLog& log : evals_) log.Row({Decimal(step), Decimal(episode), Decimal(ret)});
+}
+
+void RunLogs::Flush() {
+  episodes_.Flush();
+  updates_.Flush();
+  for (CsvLog& log : evals_) log.Flush();
+}
+
+void RunLogs::Visit(StateVisitor& v) {
+  episodes_.Visit(v, "episodes");
+  updates_.Visit(v, "updates");
+  for (CsvLog& log : evals_) log.Visit(v, "evals");
+}
+
+std::vector<CurvePoint> ReadEpisodes(const std::filesystem::path& path) {
+  std::vector<CurvePoint> episodes;
+  if (ReadFile(path) == Concat(kEpisodesHeader, "\n")) return episodes;  // no episode has ended
+  const CsvTable table = ReadCsv(path);
+  const std::size_t step = table.Column("step"), ret = table.Column("return");
+  for (std::size_t row = 0; row < table.Rows(); ++row) {
+    episodes.emplace_back(static_cast<std::int64_t>(table.At(row, step)), table.At(row, ret));
+  }
+  return episodes;
+}
+
+std::vector<CurvePoint> SmoothedReturns(std::span<const CurvePoint> episodes) {
+  std::vector<CurvePoint> curve;
+  for (std::size_t end = kSmoothing; end <= episodes.size(); ++end) {
+    double sum = 0;
+    for (const auto& [step, ret] : episodes.subspan(end - kSmoothing, kSmoothing)) sum += ret;
+    curve.emplace_back(episodes[end - 1].first, sum / kSmoothing);
+  }
+  return curve;
+}
+
+std::string RecordCsv(std::span<const CurvePoint> episodes, std::int64_t steps) {
+  const std::vector<CurvePoint> curve = SmoothedReturns(episodes);
+  std::string text = "step,return_20\n";
+  std::size_t known = 0;  // points of the curve at or before the grid step
+  for (std::int64_t step = 0; step < steps;) {
+    step = std::min(step + kGrid, steps);
+    while (known < curve.size() && curve[known].first <= step) ++known;
+    if (known > 0) text += Decimal(step) + "," + Decimal(curve[known - 1].second) + "\n";
+  }
+  return text;
+}
+
+}  // namespace o2v

@@ -1,0 +1,81 @@
+#pragma once
+// The CSV files of a run folder, and the record that is kept of a finished run.
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <initializer_list>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/state.h"
+#include "rollout/vec_env.h"
+
+namespace o2v {
+
+/// An append-only CSV file that a checkpoint can refer to by its length and hash.
+class CsvLog {
+ public:
+  CsvLog(std::filesystem::path path, std::string header);
+
+  /// Starts an empty file: the header only.
+  void Create();
+  /// Cuts the file to the state last seen by Visit and appends from there. Throws Error when the
+  /// file is shorter or its beginning has changed.
+  void Resume();
+  /// Appends a row of ready cells.
+  void Row(std::initializer_list<std::string> cells);
+  void Row(std::span<const std::string> cells);
+  /// Hands all rows to the system. Throws Error when a write failed.
+  void Flush();
+
+  /// `<prefix>.bytes`, `<prefix>.hash`.
+  void Visit(StateVisitor& v, const std::string& prefix);
+
+ private:
+  void Append(const std::string& line);
+
+  std::filesystem::path path_;
+  std::string header_;
+  std::ofstream out_;
+  std::int64_t bytes_ = 0;  // written so far
+  std::int64_t hash_ = 0;   // Fnv1a of them
+};
+
+/// episodes.csv, updates.csv and, where wanted, evals.csv.
+class RunLogs {
+ public:
+  /// updates.csv has the column `step` and `stat_names`.
+  RunLogs(const std::filesystem::path& dir, const std::vector<std::string>& stat_names, bool evals);
+
+  void Create();
+  void Resume();
+  void AddEpisode(const Episode& episode);
+  void AddUpdate(std::int64_t step, std::span<const double> stats);
+  void AddEval(std::int64_t step, int episode, double ret);
+  void Flush();
+  void Visit(StateVisitor& v);
+
+ private:
+  CsvLog episodes_, updates_;
+  std::vector<CsvLog> evals_;  // one or none
+};
+
+/// A point of a learning curve: step [environment steps], return.
+using CurvePoint = std::pair<std::int64_t, double>;
+
+/// The authors' smoothing: the mean return of the last 20 episodes, at the step of the 20th.
+/// Empty for fewer than 20 episodes.
+std::vector<CurvePoint> SmoothedReturns(std::span<const CurvePoint> episodes);
+
+/// (step, return) of every row of an episodes.csv.
+std::vector<CurvePoint> ReadEpisodes(const std::filesystem::path& path);
+
+/// The record of a finished run, as CSV: `step,return_20` on a grid of 10 000 steps up to `steps`
+/// (and `steps` itself), the last smoothed value at or before the grid step, not interpolated; no
+/// row before the first. The row of step 1 000 000 is therefore exactly return_at_1M.
+std::string RecordCsv(std::span<const CurvePoint> episodes, std::int64_t steps);
+
+}  // namespace o2v

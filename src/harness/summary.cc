@@ -1,0 +1,215 @@
+#include "harness/summary.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <iomanip>
+#include <map>
+#include <sstream>
+#include <string_view>
+#include <tuple>
+
+#include "base/check.h"
+#include "base/csv.h"
+#include "embedded/reference.h"
+#include "harness/config.h"
+#include "harness/manifest.h"
+
+namespace o2v {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kMillion = 1'000'000;    // [environment steps] return_at_1M's
+constexpr std::uint64_t kBootstrapSeed = 2021;  // any number: makes the intervals repeatable
+
+// Method ids and the names in the authors' tables.
+const std::map<std::string, std::string, std::less<>> kPublishedNames = {
+    {"ppo", "PPO"}, {"option2vec", "Option2Vec"}};
+
+/// Rows of an embedded reference file, without its header.
+std::vector<std::vector<std::string>> ReferenceRows(std::string_view name) {
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& file : Embedded_reference()) {
+    if (file.name != name) continue;
+    std::istringstream in{std::string(file.text)};
+    std::string line;
+    std::getline(in, line);
+    while (std::getline(in, line)) {
+      std::istringstream cells(line);
+      for (rows.emplace_back(); std::getline(cells, line, ',');) rows.back().push_back(line);
+    }
+  }
+  Check(!rows.empty(), "no reference ", name);
+  return rows;
+}
+
+/// One run's record.
+struct RunRecord {
+  Record meta;
+  std::int64_t wanted_steps;                           // of its config
+  std::vector<std::pair<std::int64_t, double>> curve;  // (step, smoothed return), by step
+};
+
+RunRecord ReadRun(const fs::path& json) {
+  RunRecord run;
+  run.meta = ReadRecord(json);
+  run.wanted_steps = ParseRunConfig(run.meta.config, json.string()).steps;
+  const CsvTable table = ReadCsv(fs::path(json).replace_extension(".csv"));
+  const std::size_t step = table.Column("step"), ret = table.Column("return_20");
+  for (std::size_t i = 0; i < table.Rows(); ++i) {
+    run.curve.emplace_back(std::llround(table.At(i, step)), table.At(i, ret));
+  }
+  return run;
+}
+
+SummaryRow MakeRow(const std::tuple<std::string, std::string, std::string>& key,
+                   const std::vector<RunRecord>& runs) {
+  SummaryRow row;
+  std::tie(row.fidelity, row.task, row.algorithm) = key;
+  row.step = kMillion;
+  for (const RunRecord& run : runs) row.step = std::min(row.step, run.wanted_steps);
+  for (const RunRecord& run : runs) {
+    const auto after = std::find_if(run.curve.begin(), run.curve.end(),
+                                    [&](const auto& point) { return point.first > row.step; });
+    if (run.meta.status == RunStatus::kDiverged && run.meta.steps < row.step) {
+      ++row.n_diverged;
+    } else if (after == run.curve.begin()) {
+      ++row.n_short;
+    } else {
+      row.values.push_back(std::prev(after)->second);
+    }
+  }
+  return row;
+}
+
+/// Six significant digits, as the authors' tables.
+std::string Six(double x) {
+  std::ostringstream out;
+  out << std::setprecision(6) << x;
+  return out.str();
+}
+
+/// For the eye: four significant digits, no exponents.
+std::string Four(double x) {
+  const double size = std::abs(x);
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(size < 10 ? 3 : size < 100 ? 2 : size < 1000 ? 1 : 0) << x;
+  return out.str();
+}
+
+}  // namespace
+
+std::optional<Published> PublishedReturn(const std::string& task, const std::string& algorithm,
+                                         std::int64_t step) {
+  const auto name = kPublishedNames.find(algorithm);
+  if (name == kPublishedNames.end()) return std::nullopt;
+  if (step >=
+      kMillion) {  // suite,env,algorithm,embed_dim,run,steps_logged,return_at_1M,return_last
+    std::vector<double> returns;
+    for (const auto& row : ReferenceRows("single_task_runs.csv")) {
+      if (row.at(0) == "final" && row.at(1) == task && row.at(2) == name->second) {
+        returns.push_back(std::stod(row.at(6)));
+      }
+    }
+    if (returns.empty()) return std::nullopt;
+    return Published{Mean(returns), Std(returns), static_cast<int>(returns.size())};
+  }
+  std::vector<std::pair<std::int64_t, Published>> curve;  // env,algorithm,step,mean,std,n
+  for (const auto& row : ReferenceRows("single_task_curves.csv")) {
+    if (row.at(0) != task || row.at(1) != name->second) continue;
+    curve.emplace_back(std::stoll(row.at(2)),
+                       Published{std::stod(row.at(3)), std::stod(row.at(4)), std::stoi(row.at(5))});
+  }
+  const auto above = std::find_if(curve.begin(), curve.end(),
+                                  [&](const auto& point) { return point.first >= step; });
+  if (above == curve.end()) return std::nullopt;
+  if (above->first == step) return above->second;
+  const auto& [low_step, low] = *std::prev(above);
+  const double part =
+      static_cast<double>(step - low_step) / static_cast<double>(above->first - low_step);
+  return Published{std::lerp(low.mean, above->second.mean, part),
+                   std::lerp(low.std, above->second.std, part), low.n};
+}
+
+std::vector<SummaryRow> Summarize(const fs::path& experiment) {
+  std::map<std::tuple<std::string, std::string, std::string>, std::map<fs::path, RunRecord>> groups;
+  if (fs::is_directory(experiment)) {
+    for (const auto& entry : fs::recursive_directory_iterator(experiment)) {
+      const fs::path file = entry.path(), below = file.lexically_relative(experiment);
+      const std::vector<fs::path> parts(below.begin(), below.end());
+      constexpr std::size_t kDepth = 4;  // fidelity, task, algorithm, seed-003.json
+      if (parts.size() != kDepth || file.extension() != ".json") continue;
+      groups[{parts[0], parts[1], parts[2]}].emplace(file, ReadRun(file));
+    }
+  }
+  if (groups.empty()) throw ConfigError(experiment.string() + ": no record of a finished run");
+  std::vector<SummaryRow> rows;
+  for (const auto& [key, by_file] : groups) {
+    std::vector<RunRecord> runs;
+    for (const auto& [file, run] : by_file) runs.push_back(run);
+    rows.push_back(MakeRow(key, runs));
+  }
+  return rows;
+}
+
+std::string SummaryCsv(const std::vector<SummaryRow>& rows) {
+  std::string text = "fidelity,task,algorithm,step,n_seeds,mean,std,stderr,iqm,ci_low,ci_high\n";
+  for (const SummaryRow& row : rows) {
+    if (row.values.empty()) continue;
+    const Interval ci = BootstrapInterval(row.values, kBootstrapSeed);
+    text += Concat(row.fidelity, ",", row.task, ",", row.algorithm, ",", row.step, ",",
+                   row.values.size(), ",", Six(Mean(row.values)), ",", Six(Std(row.values)), ",",
+                   Six(StdError(row.values)), ",", Six(Iqm(row.values)), ",", Six(ci.low), ",",
+                   Six(ci.high), "\n");
+  }
+  return text;
+}
+
+std::string SummaryTable(const std::vector<SummaryRow>& rows) {
+  std::vector<std::vector<std::string>> table = {{"fidelity", "task", "method", "step", "n",
+                                                  "mean +- std", "stderr", "IQM", "95 % interval",
+                                                  "authors (n)", "no value"}};
+  for (const SummaryRow& row : rows) {
+    std::vector<std::string> line = {row.fidelity, row.task, row.algorithm,
+                                     std::to_string(row.step), std::to_string(row.values.size())};
+    if (row.values.empty()) {
+      line.insert(line.end(), 4, "-");
+    } else {
+      const Interval ci = BootstrapInterval(row.values, kBootstrapSeed);
+      line.push_back(Concat(Four(Mean(row.values)), " +- ", Four(Std(row.values))));
+      line.push_back(Four(StdError(row.values)));
+      line.push_back(Four(Iqm(row.values)));
+      line.push_back(Concat("[", Four(ci.low), ", ", Four(ci.high), "]"));
+    }
+    const auto authors = PublishedReturn(row.task, row.algorithm, row.step);
+    line.push_back(
+        authors ? Concat(Four(authors->mean), " +- ", Four(authors->std), " (", authors->n, ")")
+                : "-");
+    line.push_back(row.n_diverged + row.n_short == 0
+                       ? ""
+                       : Concat(row.n_diverged, " diverged, ", row.n_short, " short"));
+    table.push_back(std::move(line));
+  }
+
+  std::vector<std::size_t> width(table[0].size());
+  for (const auto& line : table) {
+    for (std::size_t i = 0; i < line.size(); ++i) width[i] = std::max(width[i], line[i].size());
+  }
+  std::string text;
+  for (const auto& line : table) {
+    std::string padded;
+    for (std::size_t i = 0; i < line.size(); ++i) {
+      padded += line[i] + std::string(width[i] - line[i].size() + 2, ' ');
+    }
+    text += padded.substr(0, padded.find_last_not_of(' ') + 1) + "\n";
+  }
+  return text +
+         "\nReturns: mean of the last 20 training episodes at the step, mean +- std (ddof 0) over "
+         "n\n"
+         "seeds. Authors: their curves at that step, from 1000000 on their return_at_1M; they are "
+         "of\n"
+         "the released code. Short: fewer than 20 episodes.\n";
+}
+
+}  // namespace o2v

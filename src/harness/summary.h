@@ -1,0 +1,47 @@
+#pragma once
+// The table of an experiment's results beside the authors' numbers.
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/stats.h"
+
+namespace o2v {
+
+/// Mean and population standard deviation over n of the authors' runs.
+struct Published {
+  double mean = 0, std = 0;
+  int n = 0;
+};
+
+/// What the authors' runs returned at `step`: their return_at_1M from one million steps on, before
+/// that their mean curve (linear between grid points). Nothing where they have no runs, or for a
+/// method that is not theirs. Source: results/reference/README.md.
+std::optional<Published> PublishedReturn(const std::string& task, const std::string& algorithm,
+                                         std::int64_t step);
+
+/// One line of the table: the runs of one task, method and fidelity over seeds.
+struct SummaryRow {
+  std::string fidelity, task, algorithm;
+  std::int64_t step = 0;       // [environment steps] that the returns belong to
+  std::vector<double> values;  // smoothed return of every run that came to `step` and has one
+  int n_diverged = 0;          // runs that broke off before it
+  int n_short = 0;             // runs that came to it with fewer than 20 episodes, hence no value
+};
+
+/// Reads the records seed-*.csv and seed-*.json below `experiment` (results/quick). `step` of a row
+/// is the least of the runs' own steps, at most 1 000 000. Rows sorted by fidelity, task and
+/// method. Throws ConfigError when there is no record at all, Error for a damaged one.
+std::vector<SummaryRow> Summarize(const std::filesystem::path& experiment);
+
+/// fidelity, task, algorithm, step, n_seeds, mean, std, stderr, iqm, ci_low, ci_high as CSV: std
+/// with divisor n, 95 % bootstrap interval of the mean. A row without values is left out.
+std::string SummaryCsv(const std::vector<SummaryRow>& rows);
+
+/// The same for the eye, with the authors' numbers and with the runs that have no value.
+std::string SummaryTable(const std::vector<SummaryRow>& rows);
+
+}  // namespace o2v

@@ -1,0 +1,357 @@
+#include "harness/trainer.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <deque>
+#include <fstream>
+#include <iomanip>
+#include <ostream>
+#include <sstream>
+
+#include "base/check.h"
+#include "base/files.h"
+#include "harness/checkpoint.h"
+#include "harness/evaluate.h"
+#include "harness/metrics.h"
+
+namespace o2v {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;  // for timing and progress only, never for training
+
+double Seconds(Clock::duration d) { return std::chrono::duration<double>(d).count(); }
+double CpuSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+/// UTC, ISO 8601.
+std::string Now() {
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  std::tm utc{};
+  ::gmtime_r(&now, &utc);
+  std::ostringstream out;
+  out << std::put_time(&utc, "%Y-%m-%dT%H:%M:%SZ");
+  return out.str();
+}
+
+/// True when a multiple of `every` lies in (before, now]; never for every = 0.
+bool Crossed(std::int64_t every, std::int64_t before, std::int64_t now) {
+  return every > 0 && now / every > before / every;
+}
+
+/// Holds a run folder for this process; the system lets go when the process ends, however it does.
+class FolderLock {
+ public:
+  explicit FolderLock(const fs::path& dir) : fd_(::open(dir.c_str(), O_RDONLY | O_CLOEXEC)) {
+    Check(fd_ >= 0, dir.string(), ": cannot be opened");
+    if (::flock(fd_, LOCK_EX | LOCK_NB) != 0) {
+      ::close(fd_);
+      throw ConfigError(dir.string() + ": another process trains in this folder");
+    }
+  }
+  ~FolderLock() { ::close(fd_); }
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  int fd_;
+};
+
+/// Throws ConfigError with the first line in which the folder's config and the wanted one differ.
+void RequireSameConfig(const fs::path& path, const std::string& wanted) {
+  std::istringstream a(ReadFile(path)), b(wanted);
+  std::string line_a, line_b;
+  for (int line = 1;; ++line) {
+    const bool more_a = static_cast<bool>(std::getline(a, line_a));
+    const bool more_b = static_cast<bool>(std::getline(b, line_b));
+    if (!more_a && !more_b) return;
+    if (more_a && more_b && line_a == line_b) continue;
+    throw ConfigError(Concat(path.string(), ":", line, ": this run was started with '",
+                             more_a ? line_a : "(nothing)", "', not '",
+                             more_b ? line_b : "(nothing)", "'"));
+  }
+}
+
+/// Accepts or refuses a folder; writes config.toml into a new one.
+void PrepareFolder(const fs::path& dir, const std::string& config, bool resume,
+                   const std::optional<Manifest>& manifest) {
+  const fs::path path = dir / "config.toml";
+  if (!fs::exists(path)) {
+    for (const auto& entry : fs::directory_iterator(dir)) {
+      if (entry.path().filename() != "config.toml.tmp") {
+        throw ConfigError(Concat(dir.string(), ": holds ", entry.path().filename().string(),
+                                 " but no config.toml: not a folder of a run"));
+      }
+    }
+    WriteFileAtomically(path, config);
+    return;
+  }
+  const RunStatus status = manifest ? manifest->status : RunStatus::kRunning;
+  if (status == RunStatus::kDone || status == RunStatus::kDiverged) {
+    throw ConfigError(Concat(dir.string(), ": this run is ", ToString(status)));
+  }
+  if (!resume) throw ConfigError(dir.string() + ": holds an unfinished run; go on with --resume");
+  RequireSameConfig(path, config);
+}
+
+/// What a person sees of a run.
+class Progress {
+ public:
+  Progress(std::ostream& out, bool terminal, std::int64_t steps)
+      : out_(out), terminal_(terminal), steps_(steps) {}
+
+  void AddEpisode(double ret) {
+    constexpr std::size_t kShown = 20;  // as the smoothing of the curves
+    returns_.push_back(ret);
+    if (returns_.size() > kShown) returns_.pop_front();
+  }
+  /// `rate` in steps a second; `seconds` since the process started on the run.
+  void Show(std::int64_t step, double rate, double seconds, bool last) {
+    constexpr double kPlainEvery = 10;  // [s] between two lines in a log file
+    if (!terminal_ && !last && seconds < next_) return;
+    next_ = seconds + kPlainEvery;
+    double sum = 0;
+    for (const double ret : returns_) sum += ret;
+    const auto left = static_cast<std::int64_t>(
+        static_cast<double>(std::max<std::int64_t>(steps_ - step, 0)) / rate);
+    std::ostringstream line;
+    line << std::fixed << std::setprecision(0) << "step " << step << "/" << steps_ << "  " << rate
+         << " steps/s  return ";
+    if (returns_.empty()) {
+      line << "-";
+    } else {
+      line << std::setprecision(2) << sum / static_cast<double>(returns_.size());
+    }
+    line << "  left " << left / 60 << ":" << std::setw(2) << std::setfill('0') << left % 60;
+    constexpr const char* kClearLine = "\x1b[K";
+    out_ << (terminal_ ? "\r" : "") << line.str() << (terminal_ ? kClearLine : "")
+         << (!terminal_ || last ? "\n" : "") << std::flush;
+  }
+
+ private:
+  std::ostream& out_;
+  bool terminal_;
+  std::int64_t steps_;
+  std::deque<double> returns_;
+  double next_ = 0;
+};
+
+/// timing.csv: appended to by every process that worked on the run.
+class TimingLog {
+ public:
+  explicit TimingLog(const fs::path& path)
+      : path_(path), out_(path, std::ios::app | std::ios::ate) {
+    if (out_.tellp() == 0) out_ << "step,wall_s,cpu_s,steps_per_s\n";
+  }
+  void Row(std::int64_t step, double wall, double cpu, double rate) {
+    out_ << step << "," << wall << "," << cpu << "," << rate << "\n" << std::flush;
+    Check(out_.good(), path_.string(), ": cannot write");
+  }
+
+ private:
+  fs::path path_;
+  std::ofstream out_;
+};
+
+Metadata Describe(const RunConfig& config, const EnvSpec& spec, Algorithm& algorithm,
+                  std::int64_t total_steps) {
+  std::string switches;
+  for (const SwitchInfo& info : SwitchRegistry()) {
+    if (!info.Concerns(config.algorithm)) continue;
+    switches +=
+        (switches.empty() ? "" : " ") + info.name + "=" + SwitchValue(config.switches, info);
+  }
+  return {{"task", config.task},
+          {"method", config.algorithm},
+          {"fidelity", ToString(config.fidelity)},
+          {"switches", switches},
+          {"sizes", Concat("S=", spec.S, " A=", spec.A, " K=", algorithm.NumOptions())},
+          {"total_steps", std::to_string(total_steps)},
+          {"config", ToToml(config)}};
+}
+
+/// A run in its folder, from the first step or from its last checkpoint.
+class Run {
+ public:
+  Run(const RunConfig& config, const RunParts& parts, const fs::path& dir, const RunHooks& hooks,
+      std::ostream& progress, bool terminal)
+      : config_(config),
+        parts_(parts),
+        hooks_(hooks),
+        dir_(dir),
+        env_(parts.make_env, config.workers, config.seed),
+        algorithm_(parts.make_algorithm(env_.Spec())),
+        stat_names_(algorithm_->StatNames()),
+        logs_(dir, stat_names_, config.eval_every > 0),
+        progress_(progress, terminal, config.steps) {}
+
+  /// Loads the last checkpoint where there is one. `before` is the manifest of the processes
+  /// before.
+  void Start(const std::optional<Manifest>& before) {
+    manifest_.start = before ? before->start : Now();
+    wall_before_ = before ? before->wall_seconds : 0;
+    cpu_before_ = before ? before->cpu_seconds : 0;
+    const fs::path path = Checkpoint();
+    if (fs::exists(path)) {
+      const Metadata metadata = LoadCheckpoint(path, *algorithm_, Walk());
+      Check(metadata == Describe(config_, env_.Spec(), *algorithm_, env_.TotalSteps()),
+            path.string(), ": the checkpoint of another run: its metadata do not fit config.toml");
+      logs_.Resume();
+    } else {
+      logs_.Create();
+      env_.Reset();
+    }
+    Record(RunStatus::kRunning);
+  }
+
+  RunStatus Loop() {
+    TimingLog timing(dir_ / "timing.csv");
+    while (env_.TotalSteps() < config_.steps) {
+      const std::int64_t before = env_.TotalSteps();
+      const Clock::time_point begin = Clock::now();
+      Iterate();
+      const std::int64_t now = env_.TotalSteps();
+      const bool done = now >= config_.steps;
+      const bool stop = !done && hooks_.stop && hooks_.stop();
+      const double rate = static_cast<double>(now - before) / Seconds(Clock::now() - begin);
+      timing.Row(now, Wall(), Cpu(), rate);
+      progress_.Show(now, rate, Seconds(Clock::now() - begin_), done || stop);
+      if (done || stop || Crossed(config_.checkpoint_every, before, now)) Save();
+      if (stop) return RunStatus::kStopped;
+    }
+    return RunStatus::kDone;
+  }
+
+  /// Writes what a run of this status leaves behind.
+  void Finish(RunStatus status) {
+    LogEpisodes();  // of a rollout that diverged
+    logs_.Flush();
+    manifest_.end = Now();
+    manifest_.status = status;
+    manifest_.steps = env_.TotalSteps();
+    if (status != RunStatus::kStopped) {
+      const auto episodes = ReadEpisodes(dir_ / "episodes.csv");
+      fs::path record = dir_;
+      WriteFileAtomically(record += ".csv",
+                          RecordCsv(episodes, std::min(config_.steps, env_.TotalSteps())));
+      WriteFileAtomically(record.replace_extension(".json"),
+                          RecordJson(manifest_, ToToml(config_)));
+    }
+    Record(status);
+  }
+
+ private:
+  fs::path Checkpoint() const { return dir_ / "last.ckpt"; }
+  double Wall() const { return wall_before_ + Seconds(Clock::now() - begin_); }
+  double Cpu() const { return cpu_before_ + CpuSeconds(); }
+
+  StateWalk Walk() {
+    return [this](StateVisitor& v) {
+      algorithm_->Visit(v);
+      env_.Visit(v);
+      logs_.Visit(v);
+    };
+  }
+
+  void Iterate() {
+    const std::int64_t before = env_.TotalSteps();
+    algorithm_->Collect(env_, episodes_);
+    algorithm_->Update(stats_);
+    Check(stats_.size() == stat_names_.size(), config_.algorithm, ": ", stats_.size(),
+          " numbers for ", stat_names_.size(), " columns of updates.csv");
+    LogEpisodes();
+    logs_.AddUpdate(env_.TotalSteps(), stats_);
+    stats_.clear();
+    if (Crossed(config_.eval_every, before, env_.TotalSteps())) LogEvaluation();
+  }
+
+  void LogEpisodes() {
+    for (const Episode& episode : episodes_) {
+      logs_.AddEpisode(episode);
+      progress_.AddEpisode(episode.ret);
+    }
+    episodes_.clear();
+  }
+
+  void LogEvaluation() {
+    const std::unique_ptr<Env> env = parts_.make_env();
+    const auto episodes = Evaluate(*algorithm_, env_.normalizer(), *env, config_.eval_episodes,
+                                   /*sample_action=*/true, config_.seed);
+    int number = 0;
+    for (const EvalEpisode& e : episodes) logs_.AddEval(env_.TotalSteps(), number++, e.ret);
+  }
+
+  /// The logs first: the checkpoint holds their lengths, and they are cut to these on resume.
+  void Save() {
+    logs_.Flush();
+    if (hooks_.before_checkpoint) hooks_.before_checkpoint();
+    SaveCheckpoint(Checkpoint(), Describe(config_, env_.Spec(), *algorithm_, env_.TotalSteps()),
+                   *algorithm_, Walk(), hooks_.before_rename);
+    Record(RunStatus::kRunning);
+  }
+
+  void Record(RunStatus status) {
+    manifest_.status = status;
+    manifest_.steps = env_.TotalSteps();
+    manifest_.wall_seconds = Wall();
+    manifest_.cpu_seconds = Cpu();
+    WriteManifest(dir_, manifest_);
+  }
+
+  const RunConfig& config_;
+  const RunParts& parts_;
+  const RunHooks& hooks_;
+  const fs::path dir_;
+  VecEnv env_;
+  std::unique_ptr<Algorithm> algorithm_;
+  const std::vector<std::string> stat_names_;
+  RunLogs logs_;
+  Progress progress_;
+  Manifest manifest_;
+  std::vector<Episode> episodes_;  // of the running iteration
+  std::vector<double> stats_;
+  const Clock::time_point begin_ = Clock::now();
+  double wall_before_ = 0, cpu_before_ = 0;
+};
+
+}  // namespace
+
+RunParts PartsOf(const RunConfig& config) {
+  const EnvOptions options{.contact_forces = config.switches.contact_forces != 0};
+  return {[=] { return MakeEnv(config.task, options); },
+          [&config](const EnvSpec& spec) { return MakeRunAlgorithm(config, spec); }};
+}
+
+RunStatus Train(const RunConfig& config, const RunParts& parts, const fs::path& dir, bool resume,
+                std::ostream& progress, bool terminal, const RunHooks& hooks) {
+  const fs::path folder = dir.has_filename() ? dir : dir.parent_path();  // "run/" is "run"
+  Run run(config, parts, folder, hooks, progress,
+          terminal);  // a bad config leaves no folder behind
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw ConfigError(Concat(folder.string(), ": cannot be made: ", error.message()));
+  const FolderLock lock(folder);
+  const std::optional<Manifest> before = ReadManifest(folder);
+  PrepareFolder(folder, ToToml(config), resume, before);
+  run.Start(before);
+  try {
+    const RunStatus status = run.Loop();
+    run.Finish(status);
+    return status;
+  } catch (const DivergedError&) {
+    run.Finish(RunStatus::kDiverged);
+    throw;
+  }
+}
+
+RunStatus Train(const RunConfig& config, const fs::path& dir, bool resume, std::ostream& progress,
+                bool terminal, const RunHooks& hooks) {
+  return Train(config, PartsOf(config), dir, resume, progress, terminal, hooks);
+}
+
+}  // namespace o2v

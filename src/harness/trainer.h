@@ -1,0 +1,51 @@
+#pragma once
+// One run: rollout, update, log, checkpoint, until the steps are done.
+
+#include <filesystem>
+#include <functional>
+#include <iosfwd>
+#include <memory>
+
+#include "algo/algorithm.h"
+#include "env/env.h"
+#include "harness/config.h"
+#include "harness/manifest.h"
+#include "rollout/vec_env.h"
+
+namespace o2v {
+
+/// What a run is made of.
+struct RunParts {
+  VecEnv::Factory make_env;
+  std::function<std::unique_ptr<Algorithm>(const EnvSpec&)> make_algorithm;
+};
+/// The task and the method that a config names.
+RunParts PartsOf(const RunConfig& config);
+
+/// Moments at which a run can be interrupted from outside; each may be empty.
+struct RunHooks {
+  std::function<bool()> stop;  // asked after each iteration; true ends the run, resumable
+  std::function<void()>
+      before_checkpoint;                // the logs are flushed, the checkpoint is still the old one
+  std::function<void()> before_rename;  // the new checkpoint is written under its temporary name
+};
+
+/// Trains in the folder `dir` and returns kDone or kStopped.
+///
+/// A folder that another process trains in, that is finished or diverged, that holds something
+/// else, or that is unfinished while `resume` is false is refused with ConfigError, and so is one
+/// whose config.toml differs. With `resume` a folder that does not exist yet is started. On
+/// DivergedError the last checkpoint is kept, the manifest says so, and the error goes on to the
+/// caller.
+///
+/// `progress` gets one line that is rewritten (`terminal`) or one every 10 s.
+///
+/// A finished or diverged run leaves its record beside the folder: `<dir>.csv`, the learning curve
+/// (see RecordCsv), and `<dir>.json`, what made it (see RecordJson).
+RunStatus Train(const RunConfig& config, const RunParts& parts, const std::filesystem::path& dir,
+                bool resume, std::ostream& progress, bool terminal, const RunHooks& hooks = {});
+/// The same with PartsOf(config).
+RunStatus Train(const RunConfig& config, const std::filesystem::path& dir, bool resume,
+                std::ostream& progress, bool terminal, const RunHooks& hooks = {});
+
+}  // namespace o2v

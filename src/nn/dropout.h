@@ -1,0 +1,14 @@
+#pragma once
+// Dropout with a kept mask.
+
+#include "base/rng.h"
+#include "base/types.h"
+
+namespace o2v {
+
+/// Fills mask with 0 (probability p) or 1 / (1 - p), independently. Multiplying by the mask is both
+/// the forward and the backward pass. p is met to 2^-17: four entries are drawn from each 64 random
+/// bits.
+void DrawDropoutMask(double p, Rng& rng, Mat& mask);
+
+}  // namespace o2v

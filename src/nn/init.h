@@ -1,0 +1,21 @@
+#pragma once
+// Initial values of weights.
+
+#include "base/rng.h"
+#include "base/types.h"
+
+namespace o2v {
+
+/// gain x the Q factor of a Gaussian matrix, signs fixed by R's diagonal: rows orthonormal when
+/// rows <= cols, else columns. Source: spec 2.1 (Saxe et al. 2014).
+void Orthogonal(Mat& W, double gain, Rng& rng);
+
+/// U(-a, a), a = sqrt(6 / (fan_in + fan_out)). Source: spec 2.1 (Glorot & Bengio 2010).
+void XavierUniform(Mat& W, Index fan_in, Index fan_out, Rng& rng);
+/// The same with the fans of W (n_out, n_in) itself.
+void XavierUniform(Mat& W, Rng& rng);
+
+/// U(-a, a).
+void Uniform(Mat& W, double a, Rng& rng);
+
+}  // namespace o2v

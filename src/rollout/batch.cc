@@ -1,0 +1,39 @@
+#include "rollout/batch.h"
+
+namespace o2v {
+
+void Batch::Resize(Index S, Index A, Index B) {
+  if (s.rows() == S && a.rows() == A && s.cols() == B) return;
+  s.resize(S, B);
+  a.resize(A, B);
+  const std::size_t n = static_cast<std::size_t>(B);
+  o.resize(n);
+  o_prev.resize(n);
+  init.resize(n);
+  for (Stream* stream : {&high, &low}) {
+    stream->logp_old.resize(B);
+    stream->adv_hat.resize(B);
+    stream->ret.resize(B);
+  }
+}
+
+void Gather(const Batch& all, std::span<const int> rows, Batch& out) {
+  out.Resize(all.s.rows(), all.a.rows(), static_cast<Index>(rows.size()));
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Index to = static_cast<Index>(i), from = rows[i];
+    const std::size_t row = static_cast<std::size_t>(from);
+    out.s.col(to) = all.s.col(from);
+    out.a.col(to) = all.a.col(from);
+    out.o[i] = all.o[row];
+    out.o_prev[i] = all.o_prev[row];
+    out.init[i] = all.init[row];
+    out.high.logp_old(to) = all.high.logp_old(from);
+    out.high.adv_hat(to) = all.high.adv_hat(from);
+    out.high.ret(to) = all.high.ret(from);
+    out.low.logp_old(to) = all.low.logp_old(from);
+    out.low.adv_hat(to) = all.low.adv_hat(from);
+    out.low.ret(to) = all.low.ret(from);
+  }
+}
+
+}  // namespace o2v

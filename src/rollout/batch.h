@@ -1,0 +1,34 @@
+#pragma once
+// What a loss is computed on: a whole rollout or a minibatch of it.
+
+#include <span>
+#include <vector>
+
+#include "base/types.h"
+
+namespace o2v {
+
+/// One critic's view of the samples (DAC: the high or "hat" and the low or "bar" MDP; spec 4.6).
+struct Stream {
+  Vec logp_old;  // (B) log-probability of the choice when it was made
+  Vec adv_hat;   // (B) advantage, normalised over the whole rollout
+  Vec ret;       // (B) value target, the lambda = 1 return
+};
+
+/// B samples; a rollout is flattened time-major (all workers of step 0, then step 1, ...).
+struct Batch {
+  Mat s;                       // (S, B) normalised states
+  Mat a;                       // (A, B) raw (unclipped) actions
+  std::vector<int> o, o_prev;  // (B) options, 0-based
+  std::vector<char> init;      // (B) flag the option policy is given in the update
+  Stream high, low;            // single-stage methods use `low`
+
+  Index Size() const { return s.cols(); }
+  /// Sizes all arrays for B samples.
+  void Resize(Index S, Index A, Index B);
+};
+
+/// Copies samples `rows` of `all` into `out`, which is resized when needed.
+void Gather(const Batch& all, std::span<const int> rows, Batch& out);
+
+}  // namespace o2v

@@ -1,0 +1,109 @@
+#include "env/replay.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "base/check.h"
+#include "env/task_helpers.h"
+
+namespace o2v {
+namespace {
+
+std::filesystem::path Trajectory() {
+  return std::filesystem::path(O2V_TEST_DATA) / "trajectories" / "gym_hopper.csv";
+}
+
+std::string ConfigErrorOf(const std::string& task, const CsvTable& table) {
+  try {
+    Replay(*MakeEnv(task, EnvOptions{}), table);
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Replay, FollowsAWholeFileAndWritesItsColumns) {
+  const std::filesystem::path out = testing::TempDir() + "replay_out.csv";
+  EXPECT_LT(ReplayFile("Hopper-v2", Trajectory(), out).value, 1e-9);
+  const CsvTable written = ReadCsv(out), reference = ReadCsv(Trajectory());
+  EXPECT_EQ(written.columns, reference.columns);
+  EXPECT_EQ(written.Rows(), reference.Rows());
+  EXPECT_LT(LargestDeviation(written, reference).value, 1e-9);
+  std::filesystem::remove(out);
+}
+
+TEST(Replay, FindsAWrongNumberAndSaysWhere) {
+  CsvTable reference = ReadCsv(Trajectory());
+  const CsvTable ours = Replay(*MakeEnv("Hopper-v2", EnvOptions{}), reference);
+  const std::size_t column = reference.Column("qvel2");
+  reference.values[7 * reference.columns.size() + column] += 0.5;
+  const Deviation d = LargestDeviation(ours, reference);
+  EXPECT_EQ(d.row, 7u);
+  EXPECT_EQ(d.column, "qvel2");
+  EXPECT_GT(d.value, 0.1);
+  EXPECT_LT(LargestDeviation(ours, reference, /*rows=*/7).value, 1e-9);
+}
+
+TEST(Replay, ARowWithStepZeroIsInjected) {
+  // The file twice, one after the other: the second roll is as the first.
+  CsvTable twice = ReadCsv(Trajectory());
+  const std::vector<double> once = twice.values;
+  twice.values.insert(twice.values.end(), once.begin(), once.end());
+  const CsvTable ours = Replay(*MakeEnv("Hopper-v2", EnvOptions{}), twice);
+  const std::vector<double> first(ours.values.begin(), ours.values.begin() + long(once.size()));
+  const std::vector<double> second(ours.values.begin() + long(once.size()), ours.values.end());
+  EXPECT_EQ(first, second);
+}
+
+TEST(Replay, RowsBeyondTheFirstOnesOfEachSegmentAreLeftOut) {
+  const CsvTable reference{"r", {"step", "x"}, {0, 1, 1, 1, 2, 1, 0, 1, 1, 1}};
+  CsvTable ours = reference;
+  ours.values[5] = 9;  // third row of the first segment
+  EXPECT_EQ(LargestDeviation(ours, reference, 2).value, 0);
+  EXPECT_EQ(LargestDeviation(ours, reference, 3).value, 8);
+  ours.values[9] = 10;  // second row of the second segment
+  EXPECT_EQ(LargestDeviation(ours, reference, 2).value, 9);
+}
+
+TEST(Replay, ANonFiniteNumberDeviatesInfinitely) {
+  const CsvTable reference{"r", {"step", "x"}, {0, 1}};
+  CsvTable ours = reference;
+  ours.values[1] = std::nan("");
+  EXPECT_TRUE(std::isinf(LargestDeviation(ours, reference).value));
+}
+
+TEST(Replay, RefusesTheTrajectoryOfAnotherModel) {
+  const std::string message = ConfigErrorOf("HalfCheetah-v2", ReadCsv(Trajectory()));
+  EXPECT_NE(message.find("gym_hopper.csv:1: column 5: expected 'ctrl3' for HalfCheetah-v2, got "
+                         "'qpos0'"),
+            std::string::npos)
+      << message;
+}
+
+TEST(Replay, RefusesMissingAndAdditionalColumns) {
+  CsvTable shorter{"t.csv", {"step", "ctrl0", "qpos0", "qpos1", "qvel0"}, {0, 0, 0, 0, 0}};
+  EXPECT_EQ(ConfigErrorOf("InvertedPendulum-v2", shorter),
+            "t.csv:1: expected 6 columns for InvertedPendulum-v2 ('qvel1' is the first missing "
+            "one), got 5");
+  CsvTable longer{"t.csv",
+                  {"step", "ctrl0", "qpos0", "qpos1", "qvel0", "qvel1", "reward"},
+                  {0, 0, 0, 0, 0, 0, 0}};
+  EXPECT_EQ(ConfigErrorOf("InvertedPendulum-v2", longer),
+            "t.csv:1: expected 6 columns for InvertedPendulum-v2 ('qvel1' is the last), got 7");
+}
+
+TEST(Replay, RefusesStepsThatDoNotCountUp) {
+  CsvTable table{"t.csv",
+                 {"step", "ctrl0", "qpos0", "qpos1", "qvel0", "qvel1"},
+                 {0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0, 0}};
+  EXPECT_EQ(ConfigErrorOf("InvertedPendulum-v2", table),
+            "t.csv:3: column 'step': expected 0 or 1, got 2");
+  table.values[0] = 1;
+  EXPECT_EQ(ConfigErrorOf("InvertedPendulum-v2", table),
+            "t.csv:2: column 'step': expected 0, got 1");
+}
+
+}  // namespace
+}  // namespace o2v

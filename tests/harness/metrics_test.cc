@@ -1,0 +1,144 @@
+#include "harness/metrics.h"
+
+#include <gtest/gtest.h>
+
+#include "base/hash.h"
+#include "fake_run.h"
+
+namespace o2v {
+namespace {
+
+/// Carries integers from one visited object to another.
+class Carrier final : public StateVisitor {
+ public:
+  void Matrix(std::string_view, Mat&) override {}
+  void Doubles(std::string_view, double*, std::size_t) override {}
+  void Ints(std::string_view, std::int64_t* x, std::size_t) override {
+    if (reading_) {
+      seen_.push_back(*x);
+    } else {
+      *x = seen_.at(next_++);
+    }
+  }
+  void StartWriting() { reading_ = false, next_ = 0; }
+
+ private:
+  bool reading_ = true;
+  std::vector<std::int64_t> seen_;
+  std::size_t next_ = 0;
+};
+
+class Logs : public testing::Test {
+ protected:
+  /// One row, then the state for a checkpoint, then one more row.
+  void SetUp() override {
+    CsvLog log(path_, "step,x");
+    log.Create();
+    log.Row({"1", "0.5"});
+    log.Flush();
+    log.Visit(checkpoint_, "log");
+    log.Row({"2", "0.25"});
+    log.Flush();
+  }
+  void Resume() {
+    CsvLog log(path_, "step,x");
+    checkpoint_.StartWriting();
+    log.Visit(checkpoint_, "log");
+    log.Resume();
+    log.Row({"3", "7"});
+    log.Flush();
+  }
+
+  TestFolder dir_;
+  const std::filesystem::path path_ = dir_ / "log.csv";
+  Carrier checkpoint_;
+};
+
+TEST_F(Logs, AreCutToTheCheckpointAndGoOn) {
+  EXPECT_EQ(ReadFile(path_), "step,x\n1,0.5\n2,0.25\n");
+  Resume();
+  EXPECT_EQ(ReadFile(path_), "step,x\n1,0.5\n3,7\n");
+}
+
+TEST_F(Logs, ThatAreShorterThanTheCheckpointAreRefused) {
+  WriteFileAtomically(path_, "step,x\n1,0.");
+  EXPECT_THROW(Resume(), Error);
+}
+
+TEST_F(Logs, ThatHaveChangedAreRefusedAndLeftAlone) {
+  const std::string changed = "step,x\n1,0.6\n2,0.25\n";
+  WriteFileAtomically(path_, changed);
+  EXPECT_THROW(Resume(), Error);
+  EXPECT_EQ(ReadFile(path_), changed);
+}
+
+TEST(RunLogs, WriteTheirColumns) {
+  TestFolder dir;
+  RunLogs logs(dir / "", {"loss", "kl"}, /*evals=*/true);
+  logs.Create();
+  logs.AddEpisode({.step = 1000000,
+                   .worker = 1,
+                   .ret = -0.1,
+                   .length = 7,
+                   .terminated = true,
+                   .truncated = false});
+  logs.AddUpdate(2048, std::vector<double>{1.5, 1e-9});
+  logs.AddEval(2048, 0, 3);
+  logs.Flush();
+  EXPECT_EQ(ReadFile(dir / "episodes.csv"),
+            "step,worker,return,length,terminated,truncated\n1000000,1,-0.1,7,1,0\n");
+  EXPECT_EQ(ReadFile(dir / "updates.csv"), "step,loss,kl\n2048,1.5,1e-09\n");
+  EXPECT_EQ(ReadFile(dir / "evals.csv"), "step,episode,return\n2048,0,3\n");
+}
+
+TEST(RunLogs, WriteNoEvaluationsWhenOff) {
+  TestFolder dir;
+  RunLogs logs(dir / "", {"loss"}, /*evals=*/false);
+  logs.Create();
+  EXPECT_FALSE(std::filesystem::exists(dir / "evals.csv"));
+}
+
+TEST(ReadEpisodes, ReadsWhatTheLogWrote) {
+  TestFolder dir;
+  RunLogs logs(dir / "", {"loss"}, /*evals=*/false);
+  logs.Create();
+  logs.Flush();
+  EXPECT_TRUE(ReadEpisodes(dir / "episodes.csv").empty());
+  logs.AddEpisode(
+      {.step = 12, .worker = 0, .ret = 0.1, .length = 3, .terminated = false, .truncated = true});
+  logs.Flush();
+  EXPECT_EQ(ReadEpisodes(dir / "episodes.csv"), (std::vector<CurvePoint>{{12, 0.1}}));
+}
+
+/// n episodes of 100 steps with returns 1, 2, ..., n.
+std::vector<CurvePoint> Rising(int n) {
+  std::vector<CurvePoint> episodes;
+  for (int i = 1; i <= n; ++i) episodes.emplace_back(100 * i, i);
+  return episodes;
+}
+
+TEST(SmoothedReturns, StandAtTheStepOfThe20thEpisode) {
+  // Mean of 1..20 and of 2..21.
+  EXPECT_EQ(SmoothedReturns(Rising(21)), (std::vector<CurvePoint>{{2000, 10.5}, {2100, 11.5}}));
+  EXPECT_TRUE(SmoothedReturns(Rising(19)).empty());
+}
+
+TEST(RecordCsv, HoldsTheLastSmoothedValueAtOrBeforeTheGridStep) {
+  // 230 episodes: the 100th ends at step 10 000 (mean of 81..100), the 200th at 20 000.
+  EXPECT_EQ(RecordCsv(Rising(230), 21'000),
+            "step,return_20\n10000,90.5\n20000,190.5\n21000,200.5\n");
+  // Just before the 100th episode counts the 99th.
+  auto late = Rising(100);
+  late[99].first = 10'001;
+  EXPECT_EQ(RecordCsv(late, 10'000), "step,return_20\n10000,89.5\n");
+}
+
+TEST(RecordCsv, HasNoRowBeforeTheFirstValue) {
+  auto late = Rising(20);
+  late[19].first = 15'000;
+  EXPECT_EQ(RecordCsv(late, 20'000), "step,return_20\n20000,10.5\n");
+  EXPECT_EQ(RecordCsv(Rising(19), 20'000), "step,return_20\n");
+}
+
+}  // namespace
+}  // namespace o2v

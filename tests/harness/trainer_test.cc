@@ -1,0 +1,275 @@
+#include "harness/trainer.h"
+
+#include <gtest/gtest.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <fcntl.h>
+
+#include <sstream>
+
+#include "fake_run.h"
+
+namespace o2v {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Thrown out of the middle of a run: what is on the disk then is what a kill would leave.
+struct Interrupt {};
+
+class Trainer : public testing::Test {
+ protected:
+  RunStatus Start(const std::string& name, const RunHooks& hooks = {}) {
+    return Train(config_, parts_, dir_ / name, /*resume=*/false, progress_, /*terminal=*/false,
+                 hooks);
+  }
+  RunStatus Resume(const std::string& name) {
+    return Train(config_, parts_, dir_ / name, /*resume=*/true, progress_, /*terminal=*/false);
+  }
+  /// The message with which a folder is refused.
+  template <typename Action>
+  std::string Refused(Action&& action) {
+    try {
+      action();
+    } catch (const ConfigError& e) {
+      return e.what();
+    }
+    return "accepted";
+  }
+  void ExpectSameFiles(const std::string& a, const std::string& b) {
+    for (const std::string& file : kPromised) {
+      EXPECT_TRUE(ReadFile(dir_ / a / file) == ReadFile(dir_ / b / file)) << a << " " << file;
+    }
+    EXPECT_TRUE(ReadFile(dir_ / (a + ".csv")) == ReadFile(dir_ / (b + ".csv"))) << a;
+  }
+
+  TestFolder dir_;
+  RunConfig config_ = FakeConfig();
+  RunParts parts_ = FakeParts(config_);
+  std::ostringstream progress_;
+};
+
+TEST_F(Trainer, LeavesAWholeFolderAndItsRecord) {
+  EXPECT_EQ(Start("run"), RunStatus::kDone);
+  for (const std::string& file : kPromised) EXPECT_TRUE(fs::exists(dir_ / "run" / file)) << file;
+  const Manifest manifest = ReadManifest(dir_ / "run").value();
+  EXPECT_EQ(manifest.status, RunStatus::kDone);
+  EXPECT_EQ(manifest.steps, 200);
+  EXPECT_GT(manifest.wall_seconds, 0);
+  EXPECT_EQ(ReadFile(dir_ / "run" / "config.toml"), ToToml(config_));
+  EXPECT_TRUE(ReadFile(dir_ / "run.csv").starts_with("step,return_20\n200,"));
+  EXPECT_TRUE(fs::exists(dir_ / "run.json"));
+  // 20 iterations of 5 x 2 steps, two evaluations at 50, 100, 150 and 200.
+  const std::string updates = ReadFile(dir_ / "run" / "updates.csv");
+  EXPECT_TRUE(updates.starts_with("step,reward,nudge\n10,"));
+  EXPECT_EQ(std::count(updates.begin(), updates.end(), '\n'), 1 + 20);
+  const std::string evals = ReadFile(dir_ / "run" / "evals.csv");
+  EXPECT_EQ(std::count(evals.begin(), evals.end(), '\n'), 1 + 8);
+}
+
+TEST_F(Trainer, EndsAfterTheFirstRolloutThatReachesItsSteps) {
+  config_.steps = 191;
+  Start("run");
+  EXPECT_EQ(ReadManifest(dir_ / "run")->steps, 200);
+}
+
+TEST_F(Trainer, ChecksPointsAtTheFirstBoundaryAfterEachMultipleAndAtTheEnd) {
+  config_.checkpoint_every = 45;
+  std::vector<std::int64_t> steps;
+  RunHooks hooks;
+  hooks.before_checkpoint = [&] {
+    const std::string updates =
+        ReadFile(dir_ / "run" / "updates.csv");  // flushed: ends with the step
+    steps.push_back(10 * (std::count(updates.begin(), updates.end(), '\n') - 1));
+  };
+  Start("run", hooks);
+  EXPECT_EQ(steps, (std::vector<std::int64_t>{50, 90, 140, 180, 200}));
+}
+
+TEST_F(Trainer, GivesTheSameBytesForTheSameSeed) {
+  Start("a");
+  Start("b");
+  ExpectSameFiles("a", "b");
+  config_.seed = 4;
+  parts_ = FakeParts(config_);
+  Start("c");
+  EXPECT_FALSE(ReadFile(dir_ / "a" / "episodes.csv") == ReadFile(dir_ / "c" / "episodes.csv"));
+}
+
+TEST_F(Trainer, EvaluationsDoNotChangeTraining) {
+  Start("with");
+  config_.eval_every = 0;
+  Start("without");
+  EXPECT_FALSE(fs::exists(dir_ / "without" / "evals.csv"));
+  for (const char* file : {"episodes.csv", "updates.csv"}) {
+    EXPECT_TRUE(ReadFile(dir_ / "with" / file) == ReadFile(dir_ / "without" / file)) << file;
+  }
+}
+
+TEST_F(Trainer, GoesOnFromAnInterruptionAnywhere) {
+  Start("whole");
+  for (int moment = 0; moment < 3; ++moment) {
+    for (int n = 1; n <= 7; ++n) {  // 7 checkpoints: after 30, 60, ..., 180 and 200 steps
+      const std::string name = std::to_string(moment) + "-" + std::to_string(n);
+      int count = 0;
+      const auto interrupt = [&] {
+        if (++count == n) throw Interrupt();
+      };
+      RunHooks hooks;
+      RunParts parts = parts_;
+      if (moment == 0) hooks.before_checkpoint = interrupt;
+      if (moment == 1) hooks.before_rename = interrupt;
+      if (moment == 2) {
+        parts.make_algorithm = [&](const EnvSpec& spec) {
+          auto algorithm = std::make_unique<FakeAlgorithm>(spec, config_.seed);
+          algorithm->in_update = interrupt;
+          return algorithm;
+        };
+      }
+      EXPECT_THROW(Train(config_, parts, dir_ / name, false, progress_, false, hooks), Interrupt);
+      EXPECT_EQ(ReadManifest(dir_ / name)->status, RunStatus::kRunning);
+      EXPECT_EQ(Resume(name), RunStatus::kDone);
+      ExpectSameFiles(name, "whole");
+    }
+  }
+}
+
+TEST_F(Trainer, GoesOnWhenOnlyTheManifestIsMissing) {
+  Start("whole");
+  fs::copy(dir_ / "whole", dir_ / "run", fs::copy_options::recursive);
+  fs::remove(dir_ / "run" / "manifest.json");
+  EXPECT_EQ(Resume("run"), RunStatus::kDone);
+  ExpectSameFiles("run", "whole");
+}
+
+TEST_F(Trainer, StopsWhenAskedAndGoesOn) {
+  Start("whole");
+  RunHooks hooks;
+  int asked = 0;
+  hooks.stop = [&] { return ++asked == 4; };
+  EXPECT_EQ(Start("run", hooks), RunStatus::kStopped);
+  EXPECT_EQ(ReadManifest(dir_ / "run")->status, RunStatus::kStopped);
+  EXPECT_EQ(ReadManifest(dir_ / "run")->steps, 40);
+  EXPECT_FALSE(fs::exists(dir_ / "run.csv"));
+  EXPECT_EQ(Resume("run"), RunStatus::kDone);
+  ExpectSameFiles("run", "whole");
+}
+
+TEST_F(Trainer, ResumeStartsAFolderThatDoesNotExistYet) {
+  EXPECT_EQ(Resume("new"), RunStatus::kDone);
+}
+
+TEST_F(Trainer, RefusesAFinishedFolder) {
+  Start("run");
+  const std::string expected = (dir_ / "run").string() + ": this run is done";
+  EXPECT_EQ(Refused([&] { Start("run"); }), expected);
+  EXPECT_EQ(Refused([&] { Resume("run"); }), expected);
+  EXPECT_EQ(Refused([&] { Train(config_, parts_, dir_ / "run/", true, progress_, false); }),
+            expected);
+}
+
+TEST_F(Trainer, RefusesAnUnfinishedFolderUnlessToldToGoOn) {
+  RunHooks hooks;
+  hooks.stop = [] { return true; };
+  Start("run", hooks);
+  EXPECT_EQ(Refused([&] { Start("run"); }),
+            (dir_ / "run").string() + ": holds an unfinished run; go on with --resume");
+}
+
+TEST_F(Trainer, NamesTheLineInWhichTheConfigDiffers) {
+  RunHooks hooks;
+  hooks.stop = [] { return true; };
+  Start("run", hooks);
+  config_.steps = 300;
+  const std::string text = ToToml(config_), before = text.substr(0, text.find("steps = 300"));
+  EXPECT_EQ(Refused([&] { Resume("run"); }),
+            Concat((dir_ / "run" / "config.toml").string(), ":",
+                   1 + std::count(before.begin(), before.end(), '\n'),
+                   ": this run was started with 'steps = 200', not 'steps = 300'"));
+}
+
+TEST_F(Trainer, RefusesAFolderOfOtherThings) {
+  fs::create_directory(dir_ / "run");
+  WriteFileAtomically(dir_ / "run" / "thesis.tex", "");
+  EXPECT_EQ(
+      Refused([&] { Resume("run"); }),
+      (dir_ / "run").string() + ": holds thesis.tex but no config.toml: not a folder of a run");
+}
+
+TEST_F(Trainer, RefusesAFolderThatIsBeingTrainedIn) {
+  fs::create_directory(dir_ / "run");
+  const int fd = ::open((dir_ / "run").c_str(), O_RDONLY);
+  ASSERT_EQ(::flock(fd, LOCK_EX), 0);
+  EXPECT_EQ(Refused([&] { Start("run"); }),
+            (dir_ / "run").string() + ": another process trains in this folder");
+  ::close(fd);
+  EXPECT_EQ(Start("run"), RunStatus::kDone);
+}
+
+TEST_F(Trainer, LeavesNoFolderBehindWhenTheMethodCannotBeMade) {
+  parts_.make_algorithm = [](const EnvSpec&) -> std::unique_ptr<Algorithm> {
+    throw ConfigError("x.toml:1: key 'x' is not used");
+  };
+  EXPECT_THROW(Start("run"), ConfigError);
+  EXPECT_FALSE(fs::exists(dir_ / "run"));
+}
+
+TEST_F(Trainer, RefusesTheCheckpointOfAnotherRun) {
+  RunHooks hooks;
+  hooks.stop = [] { return true; };
+  Start("run", hooks);
+  config_.seed = 4;
+  Start("other", hooks);
+  fs::copy_file(dir_ / "run" / "last.ckpt", dir_ / "other" / "last.ckpt",
+                fs::copy_options::overwrite_existing);
+  EXPECT_THROW(Resume("other"), Error);
+}
+
+/// Diverges in the n-th step of all workers together.
+TEST_F(Trainer, KeepsWhatADivergedRunHas) {
+  struct Diverging final : Env {
+    explicit Diverging(int& left) : left(left) {}
+    const EnvSpec& Spec() const override { return env.Spec(); }
+    void Reset(Rng& rng, std::span<double> obs) override { env.Reset(rng, obs); }
+    StepResult Step(std::span<const double> a, std::span<double> obs) override {
+      if (--left == 0) throw DivergedError("bad qacc");
+      return env.Step(a, obs);
+    }
+    void Visit(StateVisitor& v, const std::string& prefix) override { env.Visit(v, prefix); }
+    int& left;
+    FakeEnv env;
+  };
+  config_.eval_every = 0;
+  int left = 99;  // in the tenth rollout, after three checkpoints
+  parts_.make_env = [&left] { return std::make_unique<Diverging>(left); };
+  std::string checkpoint;
+  RunHooks hooks;
+  hooks.before_checkpoint = [&] {
+    if (fs::exists(dir_ / "run" / "last.ckpt")) checkpoint = "kept";
+  };
+  EXPECT_THROW(Start("run", hooks), DivergedError);
+  EXPECT_EQ(checkpoint, "kept");
+  EXPECT_TRUE(fs::exists(dir_ / "run" / "last.ckpt"));
+  const Manifest manifest = ReadManifest(dir_ / "run").value();
+  EXPECT_EQ(manifest.status, RunStatus::kDiverged);
+  EXPECT_EQ(manifest.steps, 98);
+  EXPECT_TRUE(fs::exists(dir_ / "run.csv"));
+  const std::string updates = ReadFile(dir_ / "run" / "updates.csv");
+  EXPECT_EQ(std::count(updates.begin(), updates.end(), '\n'), 1 + 9);
+  EXPECT_EQ(Refused([&] { Resume("run"); }), (dir_ / "run").string() + ": this run is diverged");
+}
+
+TEST_F(Trainer, ShowsOneLineOnATerminalAndPlainLinesElsewhere) {
+  std::ostringstream terminal;
+  Train(config_, parts_, dir_ / "a", false, terminal, true);
+  EXPECT_TRUE(terminal.str().starts_with("\rstep 10/200  ")) << terminal.str();
+  EXPECT_EQ(std::count(terminal.str().begin(), terminal.str().end(), '\r'), 20);
+  EXPECT_TRUE(terminal.str().ends_with("left 0:00\x1b[K\n")) << terminal.str();
+  Start("b");
+  EXPECT_EQ(progress_.str().find('\r'), std::string::npos);
+  EXPECT_TRUE(progress_.str().ends_with("left 0:00\n")) << progress_.str();
+}
+
+}  // namespace
+}  // namespace o2v
