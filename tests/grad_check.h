@@ -48,7 +48,8 @@ constexpr double kStep = 1e-6;        // of the central differences; spec 10.1
 constexpr double kTolerance = 1e-6;   // of the error; spec 10.2
 constexpr double kReluMargin = 1e-4;  // ReLU inputs nearer to 0 are redrawn; spec 10.2
 
-/// Compares `most` random entries of each tensor and the one with the largest gradient, or all.
+/// Compares `most` entries of each tensor, the one with the largest gradient and random others; all
+/// of a tensor that has no more.
 inline Comparison Compare(const std::vector<Slot>& slots, Rng& rng,
                           Index most = std::numeric_limits<Index>::max()) {
   Comparison comparison;
@@ -59,10 +60,8 @@ inline Comparison Compare(const std::vector<Slot>& slots, Rng& rng,
     Compared& tensor = comparison.emplace_back(Compared{slot.name, slot.expect, largest, {}, {}});
     if (slot.expect != Expect::kGradient) continue;
     std::set<Index> entries = {top};
-    if (n <= most + 1) {
-      for (Index i = 0; i < n; ++i) entries.insert(i);
-    }
-    while (static_cast<Index>(entries.size()) < std::min(n, most + 1)) {
+    for (Index i = 0; n <= most && i < n; ++i) entries.insert(i);
+    while (static_cast<Index>(entries.size()) < std::min(n, most)) {
       entries.insert(static_cast<Index>(rng.Below(static_cast<std::uint64_t>(n))));
     }
     for (const Index i : entries) {

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "base/align.h"
 #include "base/files.h"
 #include "base/stats.h"
 #include "env/replay.h"
@@ -42,20 +43,6 @@ struct RunOptions {
   }
 };
 
-/// Lines of cells as columns for the eye.
-void PrintTable(const std::vector<std::vector<std::string>>& lines) {
-  std::vector<std::size_t> width(lines[0].size());
-  for (const auto& line : lines) {
-    for (std::size_t i = 0; i < line.size(); ++i) width[i] = std::max(width[i], line[i].size());
-  }
-  for (const auto& line : lines) {
-    for (std::size_t i = 0; i + 1 < line.size(); ++i) {
-      std::cout << std::left << std::setw(static_cast<int>(width[i]) + 2) << line[i];
-    }
-    std::cout << line.back() << "\n";
-  }
-}
-
 // ---- list
 
 void ListTasks() {
@@ -65,7 +52,7 @@ void ListTasks() {
     lines.push_back(
         {spec.id, std::to_string(spec.S), std::to_string(spec.A), std::to_string(spec.time_limit)});
   }
-  PrintTable(lines);
+  std::cout << AlignColumns(lines);
 }
 
 void ListAlgorithms() {
@@ -85,7 +72,7 @@ void ListSwitches() {
                                  : "paper, released",
                      methods.empty() ? "all" : methods, info.effect});
   }
-  PrintTable(lines);
+  std::cout << AlignColumns(lines);
 }
 
 void AddList(CLI::App& app) {
@@ -125,7 +112,8 @@ void AddTrain(CLI::App& app) {
     const RunConfig config = ResolveRun(opt->request);
     std::signal(SIGINT, [](int signal) { stop_signal = signal; });
     std::signal(SIGTERM, [](int signal) { stop_signal = signal; });
-    const RunHooks hooks{.stop = [] { return stop_signal != 0; }};
+    RunHooks hooks;
+    hooks.stop = [] { return stop_signal != 0; };
     const bool terminal = ::isatty(STDERR_FILENO) == 1;
     if (Train(config, opt->out, opt->resume, std::cerr, terminal, hooks) == RunStatus::kStopped) {
       throw Error(opt->out + ": stopped by a signal; go on with --resume");
@@ -159,7 +147,8 @@ Policy LoadPolicyFile(const std::string& checkpoint, RunRequest request) {
   const RunConfig config = ResolveRun(request);
   const RunParts parts = PartsOf(config);
   std::unique_ptr<Env> env = parts.make_env();
-  Policy policy{std::move(env), parts.make_algorithm(env->Spec()), Normalizer(env->Spec().S)};
+  const EnvSpec spec = env->Spec();
+  Policy policy{std::move(env), parts.make_algorithm(spec), Normalizer(spec.S)};
   LoadPolicy(checkpoint, *policy.algorithm, policy.normalizer);
   return policy;
 }
@@ -261,7 +250,7 @@ void PrintParams(bool csv) {
     for (const auto& line : lines) std::cout << CLI::detail::join(line, ",") << "\n";
     return;
   }
-  PrintTable(lines);
+  std::cout << AlignColumns(lines);
   const int option_network = OptionNetworkSize(17, 6, 4, 128);  // HalfCheetah; K and h: spec 2.6
   std::cout << "\nThe paper's 15.8 %: " << cited << " / " << option_network << " = " << std::fixed
             << std::setprecision(1) << 100.0 * static_cast<double>(cited) / option_network

@@ -9,12 +9,9 @@ namespace o2v {
 void LogSoftmax(const ConstMatRef& z, Mat& log_P, Mat& P) {
   log_P.resize(z.rows(), z.cols());
   P.resize(z.rows(), z.cols());
-  for (Index b = 0; b < z.cols(); ++b) {
-    const Real max = z.col(b).maxCoeff();
-    P.col(b) = (z.col(b).array() - max).exp();
-    const Real log_sum = max + std::log(P.col(b).sum());
-    log_P.col(b) = z.col(b).array() - log_sum;
-  }
+  for (Index b = 0; b < z.cols(); ++b) log_P.col(b) = z.col(b).array() - z.col(b).maxCoeff();
+  P = log_P.array().exp();
+  for (Index b = 0; b < z.cols(); ++b) log_P.col(b).array() -= std::log(P.col(b).sum());
   P = log_P.array().exp();
 }
 

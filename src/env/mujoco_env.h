@@ -57,6 +57,7 @@ class MujocoEnv : public Env {
   std::span<const double> qvel() const { return {data_->qvel, std::size_t(model_->nv)}; }
   /// File name of the model without its ending, "gym_hopper".
   const std::string& ModelName() const { return model_name_; }
+  /// The simulator itself, for the tasks, replay, parity and tests.
   const mjModel& model() const { return *model_; }
   const mjData& data() const { return *data_; }
   mjData& data() { return *data_; }
@@ -91,8 +92,8 @@ class MujocoEnv : public Env {
   int BodyId(const char* name) const { return Id(mjOBJ_BODY, name); }
   int SiteId(const char* name) const { return Id(mjOBJ_SITE, name); }
 
-  /// (13 or so, 6) external forces on all bodies, the world's zeros first; all zeros unless
-  /// EnvOptions::contact_forces.
+  /// External torques and forces on all bodies, the world first (6, nbody); zeros unless
+  /// EnvOptions::contact_forces. MuJoCo >= 2.0 fills them on demand only.
   std::span<const double> cfrc_ext() const {
     return {data_->cfrc_ext, 6 * std::size_t(model_->nbody)};
   }

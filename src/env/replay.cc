@@ -27,12 +27,12 @@ void CheckColumns(const MujocoEnv& env, const CsvTable& table) {
     }
   }
   if (table.columns.size() != expected.size()) {
-    throw ConfigError(
-        Concat(table.path, ":1: expected ", expected.size(), " columns for ", env.Spec().id, " (",
-               table.columns.size() < expected.size()
-                   ? "'" + expected[table.columns.size()] + "' is the first missing one"
-                   : "'" + expected.back() + "' is the last",
-               "), got ", table.columns.size()));
+    const bool fewer = table.columns.size() < expected.size();
+    throw ConfigError(Concat(table.path, ":1: expected ", expected.size(), " columns for ",
+                             env.Spec().id, " ('",
+                             fewer ? expected[table.columns.size()] + "' is the first missing one"
+                                   : expected.back() + "' is the last",
+                             "), got ", table.columns.size()));
   }
 }
 
@@ -40,9 +40,10 @@ void CheckSteps(const CsvTable& table) {
   const std::size_t step = table.Column("step");
   for (std::size_t row = 0; row < table.Rows(); ++row) {
     const double next = row == 0 ? 0 : table.At(row - 1, step) + 1;
-    if (table.At(row, step) != 0 && table.At(row, step) != next) {
-      throw ConfigError(Concat(table.Place(row, step), "expected 0 ",
-                               row == 0 ? "" : Concat("or ", next), ", got ", table.At(row, step)));
+    const double got = table.At(row, step);
+    if (got != 0 && got != next) {
+      throw ConfigError(Concat(table.Place(row, step), "expected 0",
+                               row ? Concat(" or ", next) : "", ", got ", got));
     }
   }
 }

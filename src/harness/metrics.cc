@@ -54,7 +54,7 @@ void CsvLog::Resume() {
   Check(out_.is_open(), path_.string(), ": cannot be opened for writing");
 }
 
-void CsvLog::Row(std::span<const std::string> cells) {
+void CsvLog::Row(const std::vector<std::string>& cells) {
   std::string line;
   for (const std::string& cell : cells) line += (line.empty() ? "" : ",") + cell;
   Append(line + "\n");

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <initializer_list>
 #include <span>
 #include <string>
 #include <utility>
@@ -26,8 +25,7 @@ class CsvLog {
   /// file is shorter or its beginning has changed.
   void Resume();
   /// Appends a row of ready cells.
-  void Row(std::initializer_list<std::string> cells);
-  void Row(std::span<const std::string> cells);
+  void Row(const std::vector<std::string>& cells);
   /// Hands all rows to the system. Throws Error when a write failed.
   void Flush();
 

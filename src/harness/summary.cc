@@ -9,6 +9,7 @@
 #include <string_view>
 #include <tuple>
 
+#include "base/align.h"
 #include "base/check.h"
 #include "base/csv.h"
 #include "embedded/reference.h"
@@ -192,19 +193,7 @@ std::string SummaryTable(const std::vector<SummaryRow>& rows) {
     table.push_back(std::move(line));
   }
 
-  std::vector<std::size_t> width(table[0].size());
-  for (const auto& line : table) {
-    for (std::size_t i = 0; i < line.size(); ++i) width[i] = std::max(width[i], line[i].size());
-  }
-  std::string text;
-  for (const auto& line : table) {
-    std::string padded;
-    for (std::size_t i = 0; i < line.size(); ++i) {
-      padded += line[i] + std::string(width[i] - line[i].size() + 2, ' ');
-    }
-    text += padded.substr(0, padded.find_last_not_of(' ') + 1) + "\n";
-  }
-  return text +
+  return AlignColumns(table) +
          "\nReturns: mean of the last 20 training episodes at the step, mean +- std (ddof 0) over "
          "n\n"
          "seeds. Authors: their curves at that step, from 1000000 on their return_at_1M; they are "

@@ -24,15 +24,23 @@ void ActivationBackward(Activation g, const ConstMatRef& y, MatRef dy) {
       dy.array() *= 1 - y.array().square();
       break;
     case Activation::kRelu:
-      dy.array() = (y.array() > 0).select(dy.array(), 0);
+      for (Index j = 0; j < y.cols(); ++j) {  // a plain loop vectorises, Eigen's select does not
+        const Real* yj = y.data() + j * y.outerStride();
+        Real* dyj = dy.data() + j * dy.outerStride();
+        for (Index i = 0; i < y.rows(); ++i) dyj[i] = yj[i] > 0 ? dyj[i] : 0;
+      }
       break;
   }
 }
 
 void Softplus(MatRef y) {
   // max(x, 0) + ln(1 + e^{-|x|}) does not overflow.
-  y.array() = (y.array() > Real(kSoftplusLinear))
-                  .select(y.array(), y.array().max(0) + (-y.array().abs()).exp().log1p());
+  const auto smooth = y.array().max(0) + (-y.array().abs()).exp().log1p();
+  if (y.maxCoeff() <= Real(kSoftplusLinear)) {
+    y.array() = smooth;
+  } else {
+    y.array() = (y.array() > Real(kSoftplusLinear)).select(y.array(), smooth);
+  }
 }
 
 void SoftplusBackward(const ConstMatRef& y, MatRef dy) { dy.array() *= -(-y.array()).expm1(); }

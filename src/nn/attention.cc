@@ -65,7 +65,13 @@ void MemoryAttention::Forward(const ConstMatRef& x, const Memory& m, const Mat* 
     for (Index h = 0; h < heads; ++h) {
       auto a = c.alpha.col(j).segment(h * K, K);
       a += m.score_bias.col(0).segment(h * K, K);
-      a = (a.array() - a.maxCoeff()).exp();
+      a.array() -= a.maxCoeff();
+    }
+  }
+  c.alpha = c.alpha.array().exp();
+  for (Index j = 0; j < x.cols(); ++j) {
+    for (Index h = 0; h < heads; ++h) {
+      auto a = c.alpha.col(j).segment(h * K, K);
       a /= a.sum();
     }
   }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "base/check.h"
+#include "test_folder.h"
 
 namespace o2v {
 namespace {
@@ -11,11 +12,7 @@ namespace fs = std::filesystem;
 
 class Files : public testing::Test {
  protected:
-  void SetUp() override { fs::create_directory(dir_); }
-  void TearDown() override { fs::remove_all(dir_); }
-
-  /// Unique to the process: test programs run side by side.
-  const fs::path dir_ = fs::temp_directory_path() / ("o2v-files-" + std::to_string(::getpid()));
+  TestFolder dir_;
 };
 
 template <typename Action>
@@ -54,7 +51,8 @@ TEST_F(Files, ReplaceALongerLeftover) {
 TEST_F(Files, NameFileAndReasonWhenTheyCannotBeRead) {
   EXPECT_EQ(MessageOf([&] { ReadFile(dir_ / "none"); }),
             (dir_ / "none").string() + ": cannot open: No such file or directory");
-  EXPECT_EQ(MessageOf([&] { ReadFile(dir_); }), dir_.string() + ": cannot read: Is a directory");
+  EXPECT_EQ(MessageOf([&] { ReadFile(dir_ / ""); }),
+            (dir_ / "").string() + ": cannot read: Is a directory");
 }
 
 TEST_F(Files, NameFileAndReasonWhenTheyCannotBeWritten) {

@@ -26,6 +26,7 @@ class Ends : public testing::TestWithParam<Edge> {};
 TEST_P(Ends, ExactlyBeyondTheEdge) {
   const Edge edge = GetParam();
   TaskUnderTest task(edge.task);
+  const_cast<mjModel&>(task.env->model()).opt.disableflags |= mjDSBL_GRAVITY | mjDSBL_CONSTRAINT;
   double nearest_below = 1, nearest_above = 1;
   for (int i = 0; i < 400; ++i) {
     std::vector<double> qpos = task.Qpos0();

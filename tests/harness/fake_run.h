@@ -4,38 +4,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "algo/algorithm.h"
-#include "base/check.h"
 #include "base/files.h"
 #include "env/env.h"
 #include "harness/config.h"
 #include "harness/trainer.h"
+#include "test_folder.h"
 
 namespace o2v {
-
-/// An empty folder that is gone after the test.
-class TestFolder {
- public:
-  TestFolder() {
-    std::string name = std::filesystem::temp_directory_path() / "o2v-XXXXXX";
-    Check(::mkdtemp(name.data()) != nullptr, name, ": cannot be made");
-    path_ = name;
-  }
-  ~TestFolder() { std::filesystem::remove_all(path_); }
-  TestFolder(const TestFolder&) = delete;
-  TestFolder& operator=(const TestFolder&) = delete;
-
-  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-
- private:
-  std::filesystem::path path_;
-};
 
 /// A point on a line that is pushed about: reward -x^2, ends beyond |x| = 2 or after 7 steps.
 class FakeEnv final : public Env {

@@ -1,0 +1,59 @@
+// What the networks say before they have learnt anything.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "algo/setup.h"
+
+namespace o2v {
+namespace {
+
+constexpr Fidelity kFidelities[] = {Fidelity::kPaper, Fidelity::kReleased};
+
+TEST(Init, ActionsStartAtMeanZeroAndSigmaLn2) {
+  for (const AlgorithmEntry& method : AlgorithmRegistry()) {
+    for (const Fidelity fidelity : kFidelities) {
+      const auto algorithm = MakeRunAlgorithm(SmallConfig(method.id, fidelity), Sizes(5, 3));
+      Rng rng(2, "init");
+      const Batch batch = RandomBatch(5, 3, algorithm->NumOptions(), 50, rng);
+      Mat mu, sigma;
+      algorithm->ActionPolicy(batch.s, batch.o, mu, sigma);
+      // Heads of gain 1e-3 on hidden values of order 1; softplus(0) = ln 2 = 0.6931.
+      EXPECT_LT(mu.cwiseAbs().maxCoeff(), 0.02) << method.id;
+      EXPECT_LT((sigma.array() - Real(std::log(2.0))).abs().maxCoeff(), 0.02) << method.id;
+    }
+  }
+}
+
+TEST(Init, DependsOnTheSeed) {
+  for (const AlgorithmEntry& method : AlgorithmRegistry()) {
+    RunConfig config = SmallConfig(method.id, Fidelity::kPaper);
+    const auto one = MakeRunAlgorithm(config, Sizes(5, 3));
+    const auto same = MakeRunAlgorithm(config, Sizes(5, 3));
+    config.seed = 2;
+    const auto other = MakeRunAlgorithm(config, Sizes(5, 3));
+    EXPECT_EQ(one->Params()[0]->value, same->Params()[0]->value) << method.id;
+    EXPECT_NE(one->Params()[0]->value, other->Params()[0]->value) << method.id;
+  }
+}
+
+TEST(Init, EmbeddingsOfOptionsAreOrthonormal) {
+  const auto algorithm = MakeRunAlgorithm(SmallConfig("option2vec", Fidelity::kPaper), Sizes(5, 3));
+  const Mat& E = FindParam(*algorithm, "embed.W_o").value;  // (D, K), K <= D
+  EXPECT_TRUE((E.transpose() * E).isIdentity(1e-5));
+}
+
+TEST(Init, AttentionIsXavierOverTheWholeInProjection) {
+  const auto algorithm = MakeRunAlgorithm(
+      SmallConfig("option2vec", Fidelity::kReleased, {"embedding=40"}), Sizes(5, 3));
+  for (const char* name : {"attention.in.Wq", "attention.in.Wk", "attention.in.Wv"}) {
+    const Mat& W = FindParam(*algorithm, name).value;
+    const double a = std::sqrt(6.0 / (4 * 40));  // fan_in D, fan_out 3 D; spec 2.6 item 5
+    EXPECT_LE(W.cwiseAbs().maxCoeff(), a) << name;
+    EXPECT_GT(W.cwiseAbs().maxCoeff(), 0.98 * a) << name;  // 1600 uniform entries
+  }
+}
+
+}  // namespace
+}  // namespace o2v

@@ -1,0 +1,148 @@
+// Every switch changes what it says it changes, from either fidelity.
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <map>
+
+#include "algo/setup.h"
+
+namespace o2v {
+namespace {
+
+/// Numbers that a switch should change, for one method.
+using Fingerprint = std::function<std::vector<double>(const RunConfig&)>;
+
+void Append(std::vector<double>& out, const Mat& x) {
+  out.insert(out.end(), x.data(), x.data() + x.size());
+}
+
+void AppendValues(std::vector<double>& out, Algorithm& algorithm) {
+  for (const Param* p : algorithm.Params()) Append(out, p->value);
+}
+
+/// The method on a batch of ours: a parameter's values depend on its name and shape alone, so that
+/// networks of different architecture agree where they can.
+struct OnBatch {
+  explicit OnBatch(const RunConfig& config)
+      : algorithm(MakeRunAlgorithm(config, Sizes(5, 3))),
+        rng(7, "batch"),
+        batch(RandomBatch(5, 3, algorithm->NumOptions(), 24, rng)) {
+    for (Param* p : algorithm->Params()) {
+      Rng values(7, p->name);
+      p->value = RandomMat(p->value.rows(), p->value.cols(), values, 0.5);
+    }
+  }
+
+  std::unique_ptr<Algorithm> algorithm;
+  Rng rng;
+  Batch batch;
+};
+
+/// Losses and gradients of all stages.
+std::vector<double> Losses(const RunConfig& config) {
+  OnBatch on(config);
+  std::vector<double> out;
+  for (std::size_t stage = 0; stage < on.algorithm->Stages().size(); ++stage) {
+    out.push_back(on.algorithm->Loss(int(stage), on.batch, nullptr).total);
+    for (const Param* p : on.algorithm->Params()) Append(out, p->grad);
+    ZeroGrad(on.algorithm->Params());
+  }
+  return out;
+}
+
+/// Parameters after a step of each stage.
+std::vector<double> Steps(const RunConfig& config) {
+  OnBatch on(config);
+  for (std::size_t stage = 0; stage < on.algorithm->Stages().size(); ++stage) {
+    on.algorithm->Loss(int(stage), on.batch, nullptr);
+    on.algorithm->Step(int(stage));
+  }
+  std::vector<double> out;
+  AppendValues(out, *on.algorithm);
+  return out;
+}
+
+/// Parameters after a rollout with truncated episodes and the update on it.
+std::vector<double> Training(const RunConfig& config) {
+  VecEnv env = PointTask(config.workers, /*time_limit=*/5);
+  const auto algorithm = MakeRunAlgorithm(config, env.Spec());
+  Iterate(*algorithm, env);
+  std::vector<double> out;
+  AppendValues(out, *algorithm);
+  return out;
+}
+
+/// The same where advantages are of the order 1e-6: values 0 and tiny rewards.
+std::vector<double> TrainingOnTinyRewards(const RunConfig& config) {
+  VecEnv env = PointTask(config.workers, /*time_limit=*/5, /*scale=*/1e-6);
+  const auto algorithm = MakeRunAlgorithm(config, env.Spec());
+  FindParam(*algorithm, config.algorithm == "ppo" ? "critic.v.W" : "critic.q.W").value.setZero();
+  Iterate(*algorithm, env);
+  std::vector<double> out;
+  AppendValues(out, *algorithm);
+  return out;
+}
+
+/// Observations of an ant that falls on its legs.
+std::vector<double> AntObservations(const RunConfig& config) {
+  const auto env = MakeEnv("Ant-v2", {.contact_forces = config.switches.contact_forces != 0});
+  Rng rng(1, "ant");
+  std::vector<double> obs(std::size_t(env->Spec().S)), out;
+  const std::vector<double> a(std::size_t(env->Spec().A), 0.0);
+  env->Reset(rng, obs);
+  for (int step = 0; step < 30; ++step) {
+    env->Step(a, obs);
+    out.insert(out.end(), obs.begin(), obs.end());
+  }
+  return out;
+}
+
+const std::map<std::string, Fingerprint> kFingerprints = {
+    {"timelimit", Training},
+    {"adv_std_eps", TrainingOnTinyRewards},
+    {"adam_idle", Steps},
+    {"o2v_option_in_update", Losses},
+    {"o2v_init_flag", Training},
+    {"o2v_dropout", Losses},
+    {"o2v_critic", Losses},
+    {"o2v_vloss_policy", Losses},
+    {"o2v_init_relu", Losses},
+    {"o2v_query", Losses},
+    {"o2v_prev_embed_grad", Losses},
+    {"contact_forces", AntObservations},
+};
+
+/// The switch at another setting.
+Switches Flipped(Switches switches, const SwitchInfo& info) {
+  if (info.choice) {
+    Fidelity& choice = switches.*info.choice;
+    choice = choice == Fidelity::kPaper ? Fidelity::kReleased : Fidelity::kPaper;
+  } else {
+    double& number = switches.*info.number;
+    const double other = number == info.paper ? info.released : info.paper;
+    number = other != number ? other : info.high;  // both fidelities agree on some
+  }
+  return switches;
+}
+
+TEST(Switches, EachChangesALossAGradientOrTheTraining) {
+  for (const SwitchInfo& info : SwitchRegistry()) {
+    const auto found = kFingerprints.find(info.name);
+    ASSERT_NE(found, kFingerprints.end()) << info.name << ": say in this test what it changes";
+    for (const AlgorithmEntry& method : AlgorithmRegistry()) {
+      if (!info.Concerns(method.id)) continue;
+      for (const Fidelity base : {Fidelity::kPaper, Fidelity::kReleased}) {
+        RunConfig config = SmallConfig(method.id, base);
+        const std::vector<double> before = found->second(config);
+        const std::string what = info.name + ", " + method.id + ", from " + ToString(base);
+        EXPECT_EQ(found->second(config), before) << what << ": not the same twice";
+        config.switches = Flipped(config.switches, info);
+        EXPECT_NE(found->second(config), before) << what << ": changes nothing";
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace o2v

@@ -1,0 +1,186 @@
+// The program from outside: exit codes, messages, files.
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <string>
+
+#include "base/csv.h"
+#include "base/files.h"
+
+namespace o2v {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Outcome {
+  int code;
+  std::string out, err;
+};
+
+class Program : public testing::Test {
+ protected:
+  void SetUp() override {
+    fs::remove_all(dir_);
+    fs::create_directories(dir_);
+  }
+  void TearDown() override { fs::remove_all(dir_); }
+
+  /// Runs `option2vec <arguments>` in the test's own folder.
+  Outcome Run(const std::string& arguments) const {
+    const std::string command = "cd '" + dir_.string() + "' && '" + O2V_PROGRAM + "' " + arguments +
+                                " > stdout 2> stderr < /dev/null";
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, ReadFile(dir_ / "stdout"),
+            ReadFile(dir_ / "stderr")};
+  }
+  /// A run of two short rollouts.
+  Outcome Train(const std::string& more) const {
+    return Run("train --task InvertedPendulum-v2 --algo ppo --steps 128 --set rollout=64 " + more);
+  }
+
+  const fs::path dir_ =
+      fs::path(testing::TempDir()) /
+      (std::string("cli_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+};
+
+bool OneLine(const std::string& text) {
+  return !text.empty() && text.find('\n') == text.size() - 1;
+}
+
+TEST_F(Program, HelpWithExamplesSucceedsForEverySubcommand) {
+  EXPECT_EQ(Run("--help").code, 0);
+  for (const char* name :
+       {"list", "train", "eval", "forward", "params", "replay", "jobs", "summary"}) {
+    const Outcome outcome = Run(std::string(name) + " --help");
+    EXPECT_EQ(outcome.code, 0) << name;
+    EXPECT_NE(outcome.out.find("Example"), std::string::npos) << name;
+  }
+}
+
+TEST_F(Program, WrongUsageExitsWith2AndOneLine) {
+  for (const char* arguments :
+       {"", "fly", "train", "train --task Hopper-v2 --algo ppo", "list", "list shoes",
+        "train --out r --seed x", "eval --checkpoint x --episodes 0", "params --frob"}) {
+    const Outcome outcome = Run(arguments);
+    EXPECT_EQ(outcome.code, 2) << arguments;
+    EXPECT_PRED1(OneLine, outcome.err) << arguments;
+  }
+}
+
+TEST_F(Program, ConfigErrorsExitWith2AndOneLine) {
+  for (const char* arguments :
+       {"train --task Hoper-v2 --algo ppo --out r", "train --task Hopper-v2 --algo pppo --out r",
+        "train --task Hopper-v2 --algo ppo --out r --set gama=1",
+        "train --task Hopper-v2 --algo ppo --out r --config absent.toml",
+        "train --task Hopper-v2 --algo ppo --out r --seed -1", "jobs absent", "jobs run",
+        "jobs quick --seeds a", "jobs quick --tasks Hoper-v2", "summary absent",
+        "replay --task Hopper-v2 --trajectory absent.csv"}) {
+    const Outcome outcome = Run(arguments);
+    EXPECT_EQ(outcome.code, 2) << arguments << "\n" << outcome.err;
+    EXPECT_PRED1(OneLine, outcome.err) << arguments;
+    EXPECT_FALSE(fs::exists(dir_ / "r")) << arguments << " left a folder behind";
+  }
+}
+
+TEST_F(Program, AnUnreadableCheckpointExitsWith1AndOneLine) {
+  WriteFileAtomically(dir_ / "x.ckpt", "not a checkpoint");
+  const Outcome outcome = Run("eval --checkpoint x.ckpt --task Hopper-v2");
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_PRED1(OneLine, outcome.err);
+}
+
+TEST_F(Program, ListsNameTasksMethodsAndSwitches) {
+  EXPECT_NE(Run("list tasks").out.find("HumanoidStandup-v2"), std::string::npos);
+  EXPECT_NE(Run("list algorithms").out.find("option2vec\n"), std::string::npos);
+  const std::string switches = Run("list switches").out;
+  EXPECT_NE(switches.find("o2v_dropout"), std::string::npos);
+  EXPECT_NE(switches.find("[0, 0.9]"), std::string::npos) << "the values that it takes";
+}
+
+TEST_F(Program, ParamsPrintsThePapersRatio) {
+  const std::string text = Run("params").out;
+  EXPECT_NE(text.find("30598 / 193473 = 15.8 %"), std::string::npos) << text;
+  const std::string csv = Run("params --csv").out;
+  // Spec 2.2 and 2.7, S = 17, A = 6.
+  EXPECT_NE(csv.find("paper,ppo,HalfCheetah-v2,17,6,11085\n"), std::string::npos);
+  EXPECT_NE(csv.find("paper,option2vec,HalfCheetah-v2,17,6,31615\n"), std::string::npos);
+  EXPECT_NE(csv.find("released,option2vec,HalfCheetah-v2,17,6,30598\n"), std::string::npos);
+}
+
+TEST_F(Program, TrainsIntoAFolderThatItThenRefuses) {
+  ASSERT_EQ(Train("--out run").code, 0);
+  for (const char* file :
+       {"config.toml", "episodes.csv", "updates.csv", "last.ckpt", "timing.csv", "manifest.json"}) {
+    EXPECT_TRUE(fs::exists(dir_ / "run" / file)) << file;
+  }
+  EXPECT_EQ(Train("--out run").code, 2);
+  EXPECT_EQ(Train("--out run --resume").code, 2) << "it is finished";
+}
+
+TEST_F(Program, RunsAgainFromTheConfigThatItWrote) {
+  ASSERT_EQ(Train("--out a --seed 3").code, 0);
+  ASSERT_EQ(Run("train --config a/config.toml --out b --resume").code, 0);
+  for (const char* file : {"config.toml", "episodes.csv", "updates.csv", "last.ckpt"}) {
+    EXPECT_EQ(ReadFile(dir_ / "a" / file), ReadFile(dir_ / "b" / file)) << file;
+  }
+}
+
+TEST_F(Program, EvaluatesACheckpointRepeatably) {
+  ASSERT_EQ(Train("--out run").code, 0);
+  const std::string eval = "eval --checkpoint run/last.ckpt --task InvertedPendulum-v2 ";
+  const Outcome a = Run(eval + "--episodes 2 --seed 5"), b = Run(eval + "--episodes 2 --seed 5");
+  EXPECT_EQ(a.code, 0) << a.err;
+  EXPECT_EQ(a.out, b.out);
+  EXPECT_NE(a.out, Run(eval + "--episodes 2 --seed 5 --action mean").out);
+  EXPECT_EQ(Run(eval + "--algo option2vec").code, 2) << "the file says ppo";
+}
+
+TEST_F(Program, WritesNetworkOutputs) {
+  ASSERT_EQ(Train("--out run").code, 0);
+  WriteFileAtomically(dir_ / "in.csv", "s0,s1,s2,s3,o_prev,init,o\n0,0,0,0,0,1,0\n1,2,3,4,0,0,0\n");
+  const Outcome outcome = Run("forward --checkpoint run/last.ckpt --input in.csv --out out.csv");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const CsvTable table = ReadCsv(dir_ / "out.csv");
+  EXPECT_EQ(table.columns, (std::vector<std::string>{"P0", "mu0", "sigma0", "q0"}));
+  EXPECT_EQ(table.Rows(), 2u);
+  EXPECT_EQ(table.At(0, 0), 1) << "one option";
+}
+
+TEST_F(Program, ReplayPassesOnItsOwnOutputAndFailsOnAnother) {
+  WriteFileAtomically(dir_ / "in.csv",
+                      "step,ctrl0,qpos0,qpos1,qvel0,qvel1\n0,1,0,0.1,0,0\n1,1,0,0,0,0\n");
+  const std::string replay = "replay --task InvertedPendulum-v2 --trajectory ";
+  const Outcome fail = Run(replay + "in.csv --out own.csv");
+  EXPECT_EQ(fail.code, 1) << fail.err;
+  EXPECT_EQ(fail.out.substr(0, 4), "FAIL");
+  EXPECT_NE(fail.out.find("row 1"), std::string::npos) << fail.out;
+  const Outcome pass = Run(replay + "own.csv");
+  EXPECT_EQ(pass.code, 0) << pass.out;
+  EXPECT_EQ(pass.out.substr(0, 4), "PASS");
+}
+
+TEST_F(Program, JobsRunThenDisappearThenSummarise) {
+  WriteFileAtomically(dir_ / "tiny.toml",
+                      "[experiment]\ntasks = ['InvertedPendulum-v2']\nalgorithms = ['ppo']\n"
+                      "fidelities = ['paper']\nseeds = [0, 1]\n"
+                      "[run]\nsteps = 1024\n[algo.ppo]\nrollout = 512\n");
+  const std::string jobs = Run("jobs tiny.toml").out;
+  ASSERT_EQ(std::count(jobs.begin(), jobs.end(), '\n'), 2);
+  EXPECT_EQ(std::system(("cd '" + dir_.string() + "' && sh -e stdout 2> /dev/null").c_str()), 0);
+  const Outcome again = Run("jobs tiny.toml");
+  EXPECT_EQ(again.out, "");
+  EXPECT_NE(again.err.find("seed-001: done"), std::string::npos) << again.err;
+  const Outcome summary = Run("summary results/tiny");
+  EXPECT_EQ(summary.code, 0) << summary.err;
+  EXPECT_NE(summary.out.find("authors"), std::string::npos);
+  EXPECT_NE(
+      ReadFile(dir_ / "results/tiny/summary.csv").find("paper,InvertedPendulum-v2,ppo,1024,2,"),
+      std::string::npos);
+}
+
+}  // namespace
+}  // namespace o2v

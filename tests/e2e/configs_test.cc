@@ -1,0 +1,42 @@
+// Every experiment file of paper_configs/ runs.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "harness/jobs.h"
+#include "harness/trainer.h"
+
+namespace o2v {
+namespace {
+
+class PaperConfigs : public testing::TestWithParam<const char*> {};
+
+TEST_P(PaperConfigs, EveryRunOfTheFirstSeedMakesTwoUpdates) {
+  JobQuery query;
+  query.config = GetParam();
+  query.results = testing::TempDir() + "/configs";
+  query.seeds = {0};
+  for (Job& job : ListJobs(query)) {
+    job.config.hyper.Set("rollout", 32, "test");  // steps a worker: two rollouts take no time
+    const RunParts parts = PartsOf(job.config);
+    VecEnv env(parts.make_env, job.config.workers, job.config.seed);
+    auto algorithm = parts.make_algorithm(env.Spec());
+    env.Reset();
+    std::vector<Episode> episodes;
+    std::vector<double> stats;
+    for (int update = 0; update < 2; ++update) {
+      stats.clear();
+      algorithm->Collect(env, episodes);
+      algorithm->Update(stats);
+    }
+    for (const double x : stats) EXPECT_TRUE(std::isfinite(x)) << job.command;
+    EXPECT_EQ(env.TotalSteps(), 2 * 32 * job.config.workers) << job.command;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Embedded, PaperConfigs, testing::Values("quick", "ci"),
+                         [](const auto& info) { return std::string(info.param); });
+
+}  // namespace
+}  // namespace o2v

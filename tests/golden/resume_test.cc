@@ -1,0 +1,203 @@
+// SIGKILL at any moment, then a resumed run: same bytes as without stopping.
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <ctime>
+#include <memory>
+#include <sstream>
+#include <tuple>
+
+#include "base/rng.h"
+#include "real_run.h"
+
+namespace o2v {
+namespace {
+
+constexpr int kKills = 8;     // of each kind, one after the other in the same run
+constexpr int kMaxAhead = 4;  // a kill strikes within this many iterations
+// A checkpoint follows every second iteration, so that a killed process leaves at most one new: all
+// 8 kills strike before the run is done.
+constexpr int kIterations = 2 * kKills + kMaxAhead;
+
+enum class Moment { kRollout, kUpdate, kBeforeRename, kBeforeCheckpoint };
+constexpr std::pair<Moment, const char*> kMoments[] = {
+    {Moment::kRollout, "mid-rollout"},
+    {Moment::kUpdate, "mid-update"},
+    {Moment::kBeforeRename, "between temporary file and rename"},
+    {Moment::kBeforeCheckpoint, "between CSV and checkpoint"}};
+
+/// Kills the process at the n-th call.
+class Killer {
+ public:
+  explicit Killer(std::uint64_t n) : left_(n) {}
+  void operator()() {
+    if (Due()) ::raise(SIGKILL);
+  }
+  bool Due() { return --left_ == 0; }
+
+ private:
+  std::uint64_t left_;
+};
+
+/// A task that kills its process in a step.
+class KillingEnv final : public Env {
+ public:
+  KillingEnv(std::unique_ptr<Env> env, Killer& killer) : env_(std::move(env)), killer_(killer) {}
+  const EnvSpec& Spec() const override { return env_->Spec(); }
+  void Reset(Rng& rng, std::span<double> obs) override { env_->Reset(rng, obs); }
+  StepResult Step(std::span<const double> a, std::span<double> obs) override {
+    killer_();
+    return env_->Step(a, obs);
+  }
+  void Visit(StateVisitor& v, const std::string& prefix) override { env_->Visit(v, prefix); }
+
+ private:
+  std::unique_ptr<Env> env_;
+  Killer& killer_;
+};
+
+/// A method that is killed inside Update, by a timer of the kernel: where exactly does not matter
+/// to what the test asks, which is that it matters to nothing.
+class KilledAlgorithm final : public Algorithm {
+ public:
+  KilledAlgorithm(std::unique_ptr<Algorithm> algorithm, Killer& killer, long delay)
+      : algorithm_(std::move(algorithm)), killer_(killer), delay_(delay) {}
+
+  void Update(std::vector<double>& stats) override {
+    if (!killer_.Due()) return algorithm_->Update(stats);
+    sigevent event{};
+    event.sigev_notify = SIGEV_SIGNAL;
+    event.sigev_signo = SIGKILL;
+    timer_t timer;
+    Check(::timer_create(CLOCK_MONOTONIC, &event, &timer) == 0, "no timer");
+    const itimerspec when{{0, 0}, {0, delay_}};
+    Check(::timer_settime(timer, 0, &when, nullptr) == 0, "no timer");
+    algorithm_->Update(stats);
+    ::raise(SIGKILL);  // the update was faster
+  }
+
+  void Collect(VecEnv& env, std::vector<Episode>& e) override { algorithm_->Collect(env, e); }
+  std::vector<std::string> StatNames() const override { return algorithm_->StatNames(); }
+  std::vector<Param*> Params() override { return algorithm_->Params(); }
+  void Visit(StateVisitor& v) override { algorithm_->Visit(v); }
+  int NumOptions() const override { return algorithm_->NumOptions(); }
+  void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
+                    Mat& P) override {
+    algorithm_->OptionPolicy(s, o_prev, init, P);
+  }
+  void ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, Mat& sigma) override {
+    algorithm_->ActionPolicy(s, o, mu, sigma);
+  }
+  void OptionValues(const Mat& s, const std::vector<int>& o, Mat& q) override {
+    algorithm_->OptionValues(s, o, q);
+  }
+  std::vector<std::string> Stages() const override { return algorithm_->Stages(); }
+  LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) override {
+    return algorithm_->Loss(stage, batch, fixed);
+  }
+  double Step(int stage) override { return algorithm_->Step(stage); }
+  std::vector<char> InGraph(int stage) const override { return algorithm_->InGraph(stage); }
+
+ private:
+  std::unique_ptr<Algorithm> algorithm_;
+  Killer& killer_;
+  long delay_;  // [ns]
+};
+
+/// Goes on with the run until kill number `kill` of this kind. The points in iterations are seeded;
+/// those at a checkpoint are the first one of the run, then the next but one of each process.
+void TrainUntilKilled(const RunConfig& config, const std::filesystem::path& dir, Moment moment,
+                      int kill) {
+  Rng rng(17, Concat("kill", static_cast<int>(moment), '.', kill));
+  const auto steps = static_cast<std::uint64_t>(kRollout * config.workers);  // of an iteration
+  Killer killer(moment == Moment::kRollout  ? 1 + rng.Below(kMaxAhead * steps)
+                : moment == Moment::kUpdate ? 1 + rng.Below(kMaxAhead)
+                : kill == 0                 ? 1
+                                            : 2);
+  const long delay =
+      1 + static_cast<long>(rng.Below(500'000));  // [ns] an update takes about 0.5 ms
+  RunParts parts = PartsOf(config);
+  RunHooks hooks;
+  const RunParts real = parts;
+  switch (moment) {
+    case Moment::kRollout:
+      parts.make_env = [&] { return std::make_unique<KillingEnv>(real.make_env(), killer); };
+      break;
+    case Moment::kUpdate:
+      parts.make_algorithm = [&](const EnvSpec& spec) {
+        return std::make_unique<KilledAlgorithm>(real.make_algorithm(spec), killer, delay);
+      };
+      break;
+    case Moment::kBeforeRename:
+      hooks.before_rename = std::ref(killer);
+      break;
+    case Moment::kBeforeCheckpoint:
+      hooks.before_checkpoint = std::ref(killer);
+      break;
+  }
+  std::ostringstream progress;
+  Train(config, parts, dir, /*resume=*/true, progress, /*terminal=*/false, hooks);
+}
+
+/// Runs `action` in a process of its own and returns how that ended, as waitpid tells it.
+template <typename Action>
+int InChild(Action&& action) {
+  const pid_t pid = ::fork();
+  if (pid == 0) {
+    try {
+      action();
+    } catch (const std::exception& e) {
+      std::fprintf(stderr, "%s\n", e.what());
+      std::_Exit(1);
+    }
+    std::_Exit(0);
+  }
+  int status = 0;
+  Check(::waitpid(pid, &status, 0) == pid, "no child");
+  return status;
+}
+
+using Case = std::tuple<const char*, const char*, int>;  // task, method, workers
+
+class KilledRun : public testing::TestWithParam<Case> {};
+
+TEST_P(KilledRun, EndsInTheSameBytesWhenResumed) {
+  const auto [task, algorithm, workers] = GetParam();
+  const RunConfig config = ShortRun(task, algorithm, "paper", workers, kIterations);
+  TestFolder dir;
+  std::ostringstream progress;
+  Train(config, dir / "whole", /*resume=*/false, progress, /*terminal=*/false);
+  for (const auto& [moment, name] : kMoments) {
+    const std::filesystem::path run = dir / name;
+    for (int kill = 0; kill < kKills; ++kill) {
+      const int status =
+          InChild([&, moment = moment] { TrainUntilKilled(config, run, moment, kill); });
+      ASSERT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL) << name << ", kill " << kill;
+    }
+    ASSERT_EQ(Train(config, run, /*resume=*/true, progress, /*terminal=*/false), RunStatus::kDone);
+    for (const char* file : {"config.toml", "episodes.csv", "updates.csv", "last.ckpt"}) {
+      EXPECT_TRUE(ReadFile(run / file) == ReadFile(dir / "whole" / file)) << name << ": " << file;
+    }
+  }
+}
+
+std::string Name(const testing::TestParamInfo<Case>& info) {
+  std::string name =
+      Concat(std::get<0>(info.param), '_', std::get<1>(info.param), '_', std::get<2>(info.param));
+  std::erase(name, '-');
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Runs, KilledRun,
+                         testing::Combine(testing::Values("Ant-v2", "Humanoid-v2", "Reacher-v2",
+                                                          "Hopper-v2", "HalfCheetah-v2"),
+                                          testing::Values("ppo", "option2vec"),
+                                          testing::Values(1, 4)),
+                         Name);
+
+}  // namespace
+}  // namespace o2v

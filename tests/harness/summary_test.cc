@@ -1,0 +1,139 @@
+#include "harness/summary.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <string>
+
+#include "base/check.h"
+#include "base/files.h"
+#include "harness/config.h"
+#include "harness/manifest.h"
+
+namespace o2v {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Summary : public testing::Test {
+ protected:
+  void SetUp() override { fs::remove_all(root_); }
+  void TearDown() override { fs::remove_all(root_); }
+
+  /// A record as a finished run leaves it; `curve` are rows "step,return".
+  void Record(const std::string& task, int seed, std::int64_t wanted_steps,
+              const std::string& curve, RunStatus status = RunStatus::kDone,
+              std::int64_t steps = 2000000) const {
+    RunRequest request;
+    request.task = task;
+    request.algorithm = "ppo";
+    request.steps = wanted_steps;
+    request.seed = seed;
+    Manifest manifest;
+    manifest.status = status;
+    manifest.steps = steps;
+    const fs::path dir = root_ / "paper" / task / "ppo";
+    const std::string name = "seed-00" + std::to_string(seed);
+    fs::create_directories(dir);
+    WriteFileAtomically(dir / (name + ".csv"), "step,return_20\n" + curve);
+    WriteFileAtomically(dir / (name + ".json"), RecordJson(manifest, ToToml(ResolveRun(request))));
+  }
+
+  const fs::path root_ =
+      fs::path(testing::TempDir()) /
+      (std::string("summary_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+};
+
+TEST_F(Summary, TakesTheLastValueAtOrBeforeTheLeastStep) {
+  Record("Hopper-v2", 0, 30000, "10000,1\n20000,2\n30000,30\n");
+  Record("Hopper-v2", 1, 40000, "10000,5\n20000,6\n30000,50\n40000,99\n");
+  const auto rows = Summarize(root_);
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_EQ(rows[0].step, 30000);
+  EXPECT_EQ(rows[0].values, (std::vector<double>{30, 50}));
+  EXPECT_EQ(rows[0].fidelity, "paper");
+  EXPECT_EQ(rows[0].task, "Hopper-v2");
+  EXPECT_EQ(rows[0].algorithm, "ppo");
+}
+
+TEST_F(Summary, LooksAtOneMillionStepsInLongerRuns) {
+  Record("Hopper-v2", 0, 2000000, "990000,1\n1000000,2\n1010000,3\n");
+  const auto rows = Summarize(root_);
+  EXPECT_EQ(rows[0].step, 1000000);
+  EXPECT_EQ(rows[0].values, (std::vector<double>{2}));
+}
+
+TEST_F(Summary, CountsDivergedAndShortRunsApart) {
+  Record("Hopper-v2", 0, 30000, "30000,4\n");
+  Record("Hopper-v2", 1, 30000, "10000,7\n", RunStatus::kDiverged, 12000);
+  Record("Hopper-v2", 2, 30000, "");
+  const auto rows = Summarize(root_);
+  EXPECT_EQ(rows[0].values, (std::vector<double>{4}));
+  EXPECT_EQ(rows[0].n_diverged, 1);
+  EXPECT_EQ(rows[0].n_short, 1);
+  EXPECT_NE(SummaryTable(rows).find("1 diverged, 1 short"), std::string::npos);
+}
+
+TEST_F(Summary, CsvHoldsTheStatisticsOfHandMadeRuns) {
+  Record("Hopper-v2", 0, 30000, "30000,1\n");
+  Record("Hopper-v2", 1, 30000, "30000,3\n");
+  // mean 2, deviations -1 and 1: std 1, stderr 1 / sqrt 2; IQM: the halves next to the middle.
+  // The bootstrap of two values spans them.
+  EXPECT_EQ(SummaryCsv(Summarize(root_)),
+            "fidelity,task,algorithm,step,n_seeds,mean,std,stderr,iqm,ci_low,ci_high\n"
+            "paper,Hopper-v2,ppo,30000,2,2,1,0.707107,2,1,3\n");
+}
+
+TEST_F(Summary, TableHasTheAuthorsNumbersBesideOurs) {
+  Record("HalfCheetah-v2", 0, 1000000, "1000000,3000\n");
+  const std::string table = SummaryTable(Summarize(root_));
+  EXPECT_NE(table.find("3000 +- 0.000"), std::string::npos) << table;
+  EXPECT_NE(table.find("2858 +- 695.5 (10)"), std::string::npos) << table;
+}
+
+TEST_F(Summary, RefusesAFolderWithoutRecords) {
+  EXPECT_THROW(Summarize(root_), ConfigError);
+  fs::create_directories(root_);
+  EXPECT_THROW(Summarize(root_), ConfigError);
+}
+
+TEST_F(Summary, RefusesADamagedRecord) {
+  Record("Hopper-v2", 0, 30000, "30000,1\n");
+  const fs::path json = root_ / "paper/Hopper-v2/ppo/seed-000.json";
+  const std::string text = ReadFile(json);
+  WriteFileAtomically(json, text.substr(0, text.size() / 2));
+  EXPECT_THROW(Summarize(root_), Error);
+}
+
+TEST(PublishedReturn, IsReturnAt1MFromOneMillionStepsOn) {
+  // Table of results/reference/README.md.
+  const auto cheetah = PublishedReturn("HalfCheetah-v2", "option2vec", 1000000);
+  ASSERT_TRUE(cheetah);
+  EXPECT_NEAR(cheetah->mean, 3461, 0.5);
+  EXPECT_NEAR(cheetah->std, 209, 0.5);
+  EXPECT_EQ(cheetah->n, 10);
+  const auto ant = PublishedReturn("Ant-v2", "option2vec", 1500000);
+  ASSERT_TRUE(ant);
+  EXPECT_NEAR(ant->mean, 904, 0.5);
+  EXPECT_EQ(ant->n, 9);
+}
+
+TEST(PublishedReturn, IsLinearBetweenGridPointsBeforeThat) {
+  const auto low = PublishedReturn("Hopper-v2", "ppo", 200000);
+  const auto middle = PublishedReturn("Hopper-v2", "ppo", 205000);
+  const auto high = PublishedReturn("Hopper-v2", "ppo", 220000);
+  ASSERT_TRUE(low && middle && high);
+  EXPECT_NE(low->mean, high->mean);
+  EXPECT_DOUBLE_EQ(middle->mean, low->mean + (high->mean - low->mean) / 4);
+  EXPECT_DOUBLE_EQ(middle->std, low->std + (high->std - low->std) / 4);
+}
+
+TEST(PublishedReturn, IsNothingForOtherTasksAndMethods) {
+  EXPECT_FALSE(PublishedReturn("Nowhere-v2", "ppo", 1000000));
+  EXPECT_FALSE(PublishedReturn("Nowhere-v2", "ppo", 10));
+  EXPECT_FALSE(PublishedReturn("Hopper-v2", "sarsa", 1000000));
+}
+
+}  // namespace
+}  // namespace o2v
