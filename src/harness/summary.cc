@@ -12,9 +12,11 @@
 #include "base/align.h"
 #include "base/check.h"
 #include "base/csv.h"
+#include "base/files.h"
 #include "embedded/reference.h"
 #include "harness/config.h"
 #include "harness/manifest.h"
+#include "harness/metrics.h"
 
 namespace o2v {
 namespace {
@@ -48,15 +50,17 @@ std::vector<std::vector<std::string>> ReferenceRows(std::string_view name) {
 /// One run's record.
 struct RunRecord {
   Record meta;
-  std::int64_t wanted_steps;                           // of its config
-  std::vector<std::pair<std::int64_t, double>> curve;  // (step, smoothed return), by step
+  std::int64_t wanted_steps;      // of its config
+  std::vector<CurvePoint> curve;  // smoothed returns, by step
 };
 
 RunRecord ReadRun(const fs::path& json) {
   RunRecord run;
   run.meta = ReadRecord(json);
   run.wanted_steps = ParseRunConfig(run.meta.config, json.string()).steps;
-  const CsvTable table = ReadCsv(fs::path(json).replace_extension(".csv"));
+  const fs::path csv = fs::path(json).replace_extension(".csv");
+  if (ReadFile(csv) == RecordCsv({}, 0)) return run;  // fewer than 20 episodes
+  const CsvTable table = ReadCsv(csv);
   const std::size_t step = table.Column("step"), ret = table.Column("return_20");
   for (std::size_t i = 0; i < table.Rows(); ++i) {
     run.curve.emplace_back(std::llround(table.At(i, step)), table.At(i, ret));

@@ -19,7 +19,7 @@ struct RunParts {
   VecEnv::Factory make_env;
   std::function<std::unique_ptr<Algorithm>(const EnvSpec&)> make_algorithm;
 };
-/// The task and the method that a config names.
+/// The task and the method that a config names; `config` must outlive the parts.
 RunParts PartsOf(const RunConfig& config);
 
 /// Moments at which a run can be interrupted from outside; each may be empty.

@@ -30,6 +30,8 @@ double Adam::Step(std::span<const char> in_graph, IdleRule idle) {
   Check(in_graph.size() == params_.size(), "Adam: got ", in_graph.size(), " flags, not ",
         params_.size());
   const Real b1 = Real(options_.beta1), b2 = Real(options_.beta2), eps = Real(options_.eps);
+  // Rounded once: as floats 1 - 0.999f is 5e-5 off 0.001.
+  const Real c1 = Real(1 - options_.beta1), c2 = Real(1 - options_.beta2);
   const double norm = GradNorm(params_);
   const Real scale = Real(ClipFactor(norm, options_.clip_norm));
   std::int64_t corrected_t = -1;  // most tensors share one t: two powers a step, not two a tensor
@@ -54,8 +56,8 @@ double Adam::Step(std::span<const char> in_graph, IdleRule idle) {
     const Index n = params_[i]->value.size();
     for (Index k = 0; k < n; ++k) {
       const Real gk = scale * g[k];
-      const Real mk = b1 * m[k] + (1 - b1) * gk;
-      const Real vk = b2 * v[k] + (1 - b2) * gk * gk;
+      const Real mk = b1 * m[k] + c1 * gk;
+      const Real vk = b2 * v[k] + c2 * gk * gk;
       m[k] = std::abs(mk) < kTiny ? 0 : mk;
       v[k] = vk < kTiny ? 0 : vk;
       w[k] -= step * m[k] / (std::sqrt(v[k]) * root + eps);

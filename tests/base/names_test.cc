@@ -6,9 +6,8 @@ namespace o2v {
 namespace {
 
 TEST(Nearest, PutsTheLeastDistanceFirst) {
-  // Levenshtein distances to "Hoper-v2": Ant-v2 6, Hopper-v2 1, Reacher-v2 5.
-  EXPECT_EQ(Nearest("Hoper-v2", {"Ant-v2", "Hopper-v2", "Reacher-v2"}),
-            "'Hopper-v2', 'Reacher-v2', 'Ant-v2'");
+  // Levenshtein: "kitchen" 2 (t -> c, insert h), "sitting" 3 (the textbook's example), "mitten" 1.
+  EXPECT_EQ(Nearest("kitten", {"kitchen", "sitting", "mitten"}), "'mitten', 'kitchen', 'sitting'");
 }
 
 TEST(Nearest, ShowsNoMoreThanThree) {

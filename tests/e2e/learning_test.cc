@@ -18,26 +18,31 @@ double MeanReturn(const std::vector<Episode>& episodes, std::size_t from, std::s
 }
 
 TEST(Learning, KeepsAPointNearZero) {
-  // An untrained policy pushes at random: |x| is about 0.5 at the start and grows, so an episode
-  // costs about 30. A trained one is at 0 within ten steps and keeps within its noise.
+  // An untrained policy pushes at random: |x| is about 0.5, so an episode costs about 20. A trained
+  // one is at 0 within ten steps and stays within its noise: over seeds 1 to 6 it cost 1.5 to 4.5.
   for (const AlgorithmEntry& method : AlgorithmRegistry()) {
     for (const Fidelity fidelity : {Fidelity::kPaper, Fidelity::kReleased}) {
+      const std::string what = method.id + ", " + ToString(fidelity);
       const RunConfig config = SmallConfig(
           method.id, fidelity,
-          {"hidden=32", "rollout=256", "minibatch=64", "epochs=5", "learning_rate=2e-3"});
+          {"hidden=32", "rollout=256", "minibatch=64", "epochs=5", "learning_rate=1e-3"});
       VecEnv env = PointTask(config.workers, kSteps);
       const auto algorithm = MakeRunAlgorithm(config, env.Spec());
       std::vector<Episode> episodes;
-      std::vector<double> stats;
-      for (int iteration = 0; iteration < 40; ++iteration) {
+      std::vector<double> first, last;
+      algorithm->Collect(env, episodes);
+      algorithm->Update(first);
+      for (int iteration = 1; iteration < 40; ++iteration) {
         algorithm->Collect(env, episodes);
-        algorithm->Update(stats);
+        algorithm->Update(last);
       }
-      const double before = MeanReturn(episodes, 0, 20);
-      const double after = MeanReturn(episodes, episodes.size() - 50, 50);
-      RecordProperty(method.id + "_" + ToString(fidelity), std::to_string(after));
-      EXPECT_LT(before, -20) << method.id << ", " << ToString(fidelity);
-      EXPECT_GT(after, -10) << method.id << ", " << ToString(fidelity);
+      EXPECT_LT(MeanReturn(episodes, 0, 20), -15) << what;
+      EXPECT_GT(MeanReturn(episodes, episodes.size() - 50, 50), -7) << what;
+      for (const std::string& stage : algorithm->Stages()) {
+        const std::string name = "value_loss_" + stage;
+        EXPECT_LT(Stat(*algorithm, last, name), 0.5 * Stat(*algorithm, first, name))
+            << what << ", " << stage;
+      }
     }
   }
 }

@@ -78,6 +78,8 @@ TEST_P(EveryTask, ALoadedStateGoesOnAsTheSavedOne) {
   TaskUnderTest saved(GetParam(), false, kLimit), loaded(GetParam(), false, kLimit);
   saved.Reset();
   Play(saved, 37);
+  // Where the model has constraints one is active, so that qacc_warmstart matters.
+  for (int i = 0; i < 200 && saved.env->data().nefc == 0; ++i) Play(saved, 1);
   loaded.Reset();
   SavingVisitor visitor;
   saved.env->Visit(visitor, "worker0.");

@@ -72,6 +72,7 @@ inline std::string Bytes(const TaskUnderTest& task, const StepResult& result) {
   add(task.obs);
   add(task.env->qpos());
   add(task.env->qvel());
+  add({&task.env->data().time, 1});
   add({&result.reward, 1});
   bytes += result.terminated ? 'T' : '-';
   bytes += result.truncated ? 'L' : '-';

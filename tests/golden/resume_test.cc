@@ -119,7 +119,7 @@ void TrainUntilKilled(const RunConfig& config, const std::filesystem::path& dir,
                 : kill == 0                 ? 1
                                             : 2);
   const long delay =
-      1 + static_cast<long>(rng.Below(500'000));  // [ns] an update takes about 0.5 ms
+      1 + static_cast<long>(rng.Below(200'000));  // [ns] an update takes 30 to 400 us
   RunParts parts = PartsOf(config);
   RunHooks hooks;
   const RunParts real = parts;

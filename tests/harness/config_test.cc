@@ -170,7 +170,9 @@ TEST(ResolveRun, RefusesMistypedValues) {
   EXPECT_CONTAINS(MessageAbout("[algo.ppo]\nworkers = 0\n"), "whole number");
   EXPECT_CONTAINS(MessageAbout("[run]\nsteps = 1.5\n"), "whole number");
   EXPECT_CONTAINS(MessageAbout("[run]\nseed = -1\n"), "whole number");
-  EXPECT_CONTAINS(MessageAbout("[run]\nfidelity = 3\n"), "word");
+  RunRequest request;
+  request.config = ConfigText{"x.toml", "[run]\ntask = 'Ant-v2'\nalgorithm = 3\n"};
+  EXPECT_CONTAINS(Message([&] { ResolveRun(request); }), "x.toml:3: 'algorithm' is '3'");
   EXPECT_CONTAINS(MessageAbout("run = 3\n"), "[run]");
   EXPECT_CONTAINS(MessageAbout("[switches]\ntimelimit = 'sometimes'\n"), "x.toml:2");
 }
@@ -204,7 +206,10 @@ TEST(ResolveRun, RefusesARunWithoutATask) {
 }
 
 TEST(ResolveRun, NamesOfARunDoNotDependOnTheRun) {
-  EXPECT_CONTAINS(MessageAbout("[run]\nppo = {task = 'Ant-v2'}\n"), "x.toml:2: 'task'");
+  RunRequest request;
+  request.config = ConfigText{
+      "x.toml", "[run]\ntask = 'Ant-v2'\nalgorithm = 'ppo'\nppo = {task = 'Hopper-v2'}\n"};
+  EXPECT_CONTAINS(Message([&] { ResolveRun(request); }), "x.toml:4: 'task'");
 }
 
 TEST(OpenConfig, RefusesAbsentFilesAndUnknownNames) {

@@ -29,9 +29,10 @@ void ReadSettings(const json& file, Settings& hyper, Switches& switches) {
 
 void ReadBatch(const json& file, Batch& batch) {
   const json& given = file.at("batch");
-  batch.o = OracleInts(given.at("o"));
-  batch.o_prev = OracleInts(given.at("o_prev"));
-  if (Released(file)) batch.init = OracleFlags(given.at("flag_update"));
+  const int K = file.at("sizes").at("K");
+  batch.o = OracleInts(given.at("o"), batch.Size(), K);
+  batch.o_prev = OracleInts(given.at("o_prev"), batch.Size(), K);
+  if (Released(file)) batch.init = OracleFlags(given.at("flag_update"), batch.Size());
   const MatD log_P_old = OracleArray(given.at("log_P_old"));
   batch.high.logp_old.resize(batch.Size());
   for (Index b = 0; b < batch.Size(); ++b) {
@@ -55,9 +56,13 @@ std::vector<Mat> ReadMasks(const json& masks) {
 FixedDraws Draws(const json& file, const std::string& stage, std::size_t u) {
   FixedDraws draws;
   if (const std::string key = "o_drawn_" + stage; Released(file)) {
-    const MatD drawn = OracleArray(file.at("batch").at(key));
-    Check(Index(u) < drawn.cols(), key, " has ", drawn.cols(), " updates, not ", u + 1);
-    for (Index b = 0; b < drawn.rows(); ++b) draws.o.push_back(int(drawn(b, Index(u))));
+    const Index B = file.at("sizes").at("B");
+    const int K = file.at("sizes").at("K");
+    const json& drawn = file.at("batch").at(key);
+    const Index updates = drawn.at("shape").at(1);
+    Check(Index(u) < updates, key, " has ", updates, " updates, not ", u + 1);
+    const std::vector<int> all = OracleInts(drawn, B * updates, K);  // update after update
+    draws.o.assign(all.begin() + Index(u) * B, all.begin() + (Index(u) + 1) * B);
   }
   if (file.contains("dropout_masks")) {
     draws.dropout = ReadMasks(file.at("dropout_masks").at(stage).at(u));
@@ -170,7 +175,7 @@ void Forward(const json& file, Algorithm& option2vec, const Batch& batch, Compar
     return;
   }
   Batch acting = batch;
-  acting.init = OracleFlags(file.at("batch").at("init"));
+  acting.init = OracleFlags(file.at("batch").at("init"), batch.Size());
   FixedDraws draws;
   draws.o = batch.o;
   if (file.contains("dropout_masks")) {

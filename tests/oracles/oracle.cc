@@ -99,7 +99,7 @@ Batch ReadBatch(const json& file, const OracleMethod& method, const Algorithm& a
   const std::size_t B = static_cast<std::size_t>(batch.Size());
   batch.o.assign(B, 0);
   batch.o_prev.assign(B, 0);
-  batch.init = OracleFlags(given.at("init"));
+  batch.init = OracleFlags(given.at("init"), batch.Size());
   if (algorithm.Stages().size() == 2) {
     ReadStream(given, "_high", switches.adv_std_eps, batch.high, out);
     ReadStream(given, "_low", switches.adv_std_eps, batch.low, out);
@@ -235,10 +235,20 @@ MatD OracleArray(const json& array) {
   return Eigen::Map<const RowMajor>(data.data(), rows, cols);
 }
 
-std::vector<int> OracleInts(const json& array) { return array.at("data").get<std::vector<int>>(); }
+std::vector<int> OracleInts(const json& array, Index n, int below) {
+  const MatD numbers = OracleArray(array);
+  std::vector<int> out;
+  for (const double x : numbers.reshaped()) {
+    Check(x >= 0 && x < below && x == std::floor(x), "got ", x, ", not a whole number below ",
+          below);
+    out.push_back(static_cast<int>(x));
+  }
+  Check(Index(out.size()) == n, "got ", out.size(), " whole numbers, not ", n);
+  return out;
+}
 
-std::vector<char> OracleFlags(const json& array) {
-  const std::vector<int> flags = OracleInts(array);
+std::vector<char> OracleFlags(const json& array, Index n) {
+  const std::vector<int> flags = OracleInts(array, n, 2);
   return {flags.begin(), flags.end()};
 }
 

@@ -57,11 +57,12 @@ struct OracleMethod {
 OracleMethod PpoOracle();
 OracleMethod Option2VecOracle();
 
-/// An array of a file as (rows, cols). Throws Error unless it holds rows * cols finite numbers.
+/// An array of a file as (rows, cols). Throws Error unless it holds rows * cols numbers.
 MatD OracleArray(const nlohmann::json& array);
-/// An array of one column as whole numbers.
-std::vector<int> OracleInts(const nlohmann::json& array);
-std::vector<char> OracleFlags(const nlohmann::json& array);
+/// An array as n whole numbers in [0, below). Throws Error.
+std::vector<int> OracleInts(const nlohmann::json& array, Index n, int below);
+/// The same for flags.
+std::vector<char> OracleFlags(const nlohmann::json& array, Index n);
 
 /// The method of a file, by its `method`. Throws Error unless the file is one of this format.
 std::string OracleFileMethod(const nlohmann::json& file);

@@ -59,6 +59,12 @@ TEST(OracleComparison, RefusesAMissingParameter) {
   EXPECT_THROW(CompareOracle(file), Error);
 }
 
+TEST(OracleComparison, RefusesAnOptionThatDoesNotExist) {
+  nlohmann::json file = Paper();
+  file["batch"]["o"]["data"][0] = 4;  // of 0, ..., 3
+  EXPECT_THROW(CompareOracle(file), Error);
+}
+
 TEST(OracleComparison, RefusesAForeignFile) {
   EXPECT_THROW(OracleFileMethod(nlohmann::json::array()), Error);
   EXPECT_THROW(OracleFileMethod({{"format", "other"}}), Error);

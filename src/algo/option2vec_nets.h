@@ -1,0 +1,153 @@
+#pragma once
+// The three networks of Option2Vec: option policy, action policy, option value.
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/rng.h"
+#include "nn/attention_block.h"
+#include "nn/embedding.h"
+#include "nn/layer_norm.h"
+#include "nn/linear.h"
+
+namespace o2v {
+
+/// Sizes: state, action, options, embedding, FFN, attention heads, hidden, hidden of the initial
+/// net.
+struct Option2VecSizes {
+  Index S, A, K, D, F, heads, h, h_init;
+};
+
+/// Option policy P(o | s, o_{t-1}; W_o): attention of a query made of (s, o_hat_{t-1}) over the
+/// columns of W_o; at an episode's start the logits of a net of s alone.
+///   one token:   x = LN(ReLU(W [s, o_hat_{t-1}] + b)),           z = W_z t + b_z        (spec 2.7)
+///   two tokens:  x0 = LN(ReLU(W s + b)), x1 = o_hat_{t-1},       z = W_z [t0; t1] + b_z (spec 2.6)
+///   t = AttentionBlock(x; W_o)
+struct OptionPolicyNet {
+  /// The switches that shape it.
+  struct Form {
+    bool two_tokens;       // o2v_query = released
+    bool init_relu;        // o2v_init_relu = released: ReLU on the initial logits
+    bool prev_embed_grad;  // o2v_prev_embed_grad = paper: the gradient reaches o_hat_{t-1}
+  };
+
+  Param W_o;             // (D, K)
+  Linear init0, init1;   // S -> h_init -> K
+  EmbeddedLinear query;  // one token: [s, o_hat] -> D
+  Linear state;          // two tokens: s -> D
+  LayerNorm norm;
+  AttentionBlock block;
+  Linear logits;  // D or 2 D -> K
+
+  /// What a batch of B samples leaves behind; n = B or 2 B columns, state tokens first.
+  struct Cache {
+    AttentionBlock::Masks masks;
+    Mat z, log_P, P;  // (K, B) logits, ln P, P
+    Mat dz;           // (K, B) adjoint of z: the input of Backward, overwritten
+    Mat relu;         // (D, B) state token before its LayerNorm
+    Mat x, dx;        // (D, n) query tokens
+    Mat dtokens;      // (D, n)
+    LayerNorm::Cache norm;
+    AttentionBlock::Cache block;
+    std::vector<int> init_rows;  // samples with the initial flag; they fill the first columns of
+    Mat init_s, init_hidden, init_z, init_dz, init_dhidden;  // these, which are B wide
+  };
+
+  OptionPolicyNet() = default;
+  OptionPolicyNet(const Option2VecSizes& sizes, const Form& form, Rng& rng);
+
+  /// Makes what follows from the weights alone; needed before Forward whenever they have changed.
+  void MakeTables();
+  /// s (S, B), o_prev, init (B) -> c.log_P, c.P (K, B). masks null: no dropout.
+  void Forward(const ConstMatRef& s, std::span<const int> o_prev, std::span<const char> init,
+               const AttentionBlock::Masks* masks, Cache& c) const;
+  /// From c.dz; same arguments as Forward. Adds to the gradients.
+  void Backward(const ConstMatRef& s, std::span<const int> o_prev,
+                const AttentionBlock::Masks* masks, Cache& c);
+
+  Index Tokens() const { return form_.two_tokens ? 2 : 1; }
+  std::vector<Param*> Params();
+
+ private:
+  void BackwardInitial(Cache& c);
+
+  Form form_{};
+  MemoryAttention::Memory memory_;
+  Mat table_, dtable_;  // (D, K) of `query`
+};
+
+/// Action policy pi_a(a | s, o) = N(mu, sigma^2): mu = tanh(.), sigma = softplus(.) of a ReLU body
+/// on [s, o_hat], o_hat detached. Source: spec 2.6 item 7.
+struct ActionPolicyNet {
+  EmbeddedLinear layer0;
+  Linear layer1, mu, sigma;
+
+  struct Cache {
+    Mat h0, h1, dh0, dh1;  // (h, B)
+    Mat mu, sigma;         // (A, B)
+    Mat dmu, dsigma;       // (A, B) their adjoints: the input of Backward, overwritten
+  };
+
+  ActionPolicyNet() = default;
+  ActionPolicyNet(const Option2VecSizes& sizes, Rng& rng);
+
+  /// W_o (D, K). Needed before Forward whenever the weights have changed.
+  void MakeTable(const Mat& W_o) { layer0.MakeTable(W_o, table_); }
+  /// s (S, B), o (B) -> c.mu, c.sigma.
+  void Forward(const ConstMatRef& s, std::span<const int> o, Cache& c) const;
+  /// From c.dmu, c.dsigma. Adds to the gradients.
+  void Backward(const ConstMatRef& s, std::span<const int> o, const Mat& W_o, Cache& c);
+
+  std::vector<Param*> Params();
+
+ private:
+  Mat table_, dtable_;  // (h, K) of layer0
+};
+
+/// Option value, a ReLU body on [s, o_hat], o_hat detached.
+///   scalar:    Q_O[s, o] = f([s, o_hat_o]), evaluated for every o            (o2v_critic = paper)
+///   K outputs: q = f(LN([s, o_hat_fed])), of which q_k stands for option k   (o2v_critic =
+///   released)
+/// Source: spec 2.6 item 8, 2.7.
+struct OptionValueNet {
+  LayerNorm norm;         // K outputs only
+  EmbeddedLinear layer0;  // scalar
+  Linear layer0_full;     // K outputs: on the normalised [s, o_hat]
+  Linear layer1, head;
+
+  struct Cache {
+    Mat state;  // (h, B) W_x s, then its adjoint: scalar
+    Mat input;  // (S + D, B) normalised [s, o_hat]: K outputs
+    LayerNorm::Cache norm;
+    Mat h0, h1, dh0, dh1;  // (h, m), m = K B (sample-major) where every option is evaluated, else B
+    Mat q;                 // (K, B), or (1, B) of the option fed
+    Mat dq;                // its adjoint: the input of Backward
+    Mat G;                 // (h, S + D) scratch
+    Vec db;                // (h)
+  };
+
+  OptionValueNet() = default;
+  OptionValueNet(const Option2VecSizes& sizes, bool scalar, Rng& rng);
+
+  void MakeTable(const Mat& W_o) {
+    if (scalar_) layer0.MakeTable(W_o, table_);
+  }
+  /// s (S, B), o (B) the option fed (K outputs only) -> c.q (K, B).
+  void ForwardAll(const ConstMatRef& s, std::span<const int> o, const Mat& W_o, Cache& c) const;
+  /// s (S, B), o (B) -> c.q (1, B) = Q_O[s, o]. Scalar form only.
+  void ForwardOne(const ConstMatRef& s, std::span<const int> o, Cache& c) const;
+  /// From c.dq, shaped as c.q of the forward pass before. Adds to the gradients.
+  void Backward(const ConstMatRef& s, std::span<const int> o, const Mat& W_o, Cache& c);
+
+  std::vector<Param*> Params();
+
+ private:
+  void ForwardHead(Cache& c) const;
+
+  bool scalar_ = true;
+  Index K_ = 0;
+  Mat table_, dtable_;  // (h, K) of layer0
+};
+
+}  // namespace o2v

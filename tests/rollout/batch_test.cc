@@ -1,0 +1,66 @@
+#include "rollout/batch.h"
+
+#include <gtest/gtest.h>
+
+namespace o2v {
+namespace {
+
+/// Sample b of every array holds a number that only it has.
+Batch Numbered(Index B) {
+  Batch batch;
+  batch.Resize(2, 1, B);
+  for (Index b = 0; b < B; ++b) {
+    const Real x = Real(10 * b);
+    const std::size_t i = std::size_t(b);
+    batch.s.col(b) << x, x + 1;
+    batch.a(0, b) = x + 2;
+    batch.o[i] = int(b) % 4;
+    batch.o_prev[i] = int(b + 1) % 4;
+    batch.init[i] = b % 2 == 0;
+    batch.high.logp_old(b) = x + 3;
+    batch.high.adv_hat(b) = x + 4;
+    batch.high.ret(b) = x + 5;
+    batch.low.logp_old(b) = x + 6;
+    batch.low.adv_hat(b) = x + 7;
+    batch.low.ret(b) = x + 8;
+  }
+  return batch;
+}
+
+TEST(Gather, CopiesEveryArrayOfTheSamples) {
+  const Batch all = Numbered(5);
+  Batch out;
+  Gather(all, std::vector<int>{4, 1}, out);
+  ASSERT_EQ(out.Size(), 2);
+  for (Index to = 0; to < 2; ++to) {
+    const Index b = to == 0 ? 4 : 1;
+    const Real x = Real(10 * b);
+    const std::size_t i = std::size_t(to);
+    EXPECT_EQ(out.s(0, to), x);
+    EXPECT_EQ(out.s(1, to), x + 1);
+    EXPECT_EQ(out.a(0, to), x + 2);
+    EXPECT_EQ(out.o[i], int(b) % 4);
+    EXPECT_EQ(out.o_prev[i], int(b + 1) % 4);
+    EXPECT_EQ(out.init[i], b % 2 == 0);
+    EXPECT_EQ(out.high.logp_old(to), x + 3);
+    EXPECT_EQ(out.high.adv_hat(to), x + 4);
+    EXPECT_EQ(out.high.ret(to), x + 5);
+    EXPECT_EQ(out.low.logp_old(to), x + 6);
+    EXPECT_EQ(out.low.adv_hat(to), x + 7);
+    EXPECT_EQ(out.low.ret(to), x + 8);
+  }
+}
+
+TEST(Gather, ResizesOnlyWhenTheSizeChanges) {
+  const Batch all = Numbered(5);
+  Batch out;
+  Gather(all, std::vector<int>{0, 1}, out);
+  const Real* before = out.s.data();
+  Gather(all, std::vector<int>{3, 2}, out);
+  EXPECT_EQ(out.s.data(), before);
+  Gather(all, std::vector<int>{3}, out);
+  EXPECT_EQ(out.Size(), 1);
+}
+
+}  // namespace
+}  // namespace o2v
