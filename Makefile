@@ -5,8 +5,8 @@ SHELL := /bin/bash
 
 JOBS   ?= $(shell nproc)
 PRESET := $(if $(filter 1,$(SAN)),asan,release)
-BUILD  := build/$(PRESET)
-O2V    := build/release/option2vec
+O2V    := build/$(PRESET)/option2vec
+COMPILE = cmake --preset $(PRESET) > /dev/null && cmake --build --preset $(PRESET)
 
 .PHONY: help deps build test clean gradcheck parity oracles bench reproduce lint lint-tidy format golden
 
@@ -17,32 +17,36 @@ deps:  ## installs the Debian packages that are missing
 	@scripts/deps.sh
 
 build: deps  ## builds program, tests and benches (SAN=1: under ASan and UBSan)
-	@cmake --preset $(PRESET) > /dev/null
-	@cmake --build --preset $(PRESET)
+	@$(COMPILE)
 
 test: build  ## runs all tests (SAN=1: under ASan and UBSan)
-	@ctest --test-dir $(BUILD) --output-on-failure -j2
+	@ctest --test-dir build/$(PRESET) --output-on-failure -j2
 
 clean:  ## removes what was built; results stay
 	@rm -rf build
 
-gradcheck: build  ## analytic against numeric gradients; writes results/gradcheck.csv
-	@mkdir -p results && build/release/tests/gradcheck
+gradcheck: deps  ## analytic against numeric gradients; writes results/gradcheck.csv
+	@$(COMPILE) --target gradcheck
+	@build/$(PRESET)/tests/gradcheck
 
-parity: build  ## physics against the reference numbers; writes results/parity.csv
-	@mkdir -p results && build/release/tests/parity
+parity: deps  ## physics against the reference numbers; writes results/parity.csv
+	@$(COMPILE) --target parity
+	@build/$(PRESET)/tests/parity
 
 ORACLES ?= tests/data/oracles
-oracles: build  ## losses, gradients, updates against the numbers in ORACLES=DIR
-	@build/release/tests/oracles $(ORACLES)
+oracles: deps  ## losses, gradients, updates against the numbers in ORACLES=DIR
+	@$(COMPILE) --target oracles
+	@build/$(PRESET)/tests/oracles $(ORACLES)
 
-bench: build  ## cost of a layer and of an environment step beside its bound
-	@build/release/bench/o2v_bench
+bench: deps  ## costs of layers and environment steps beside the bound; writes results/bench.json
+	@$(COMPILE) --target o2v_bench
+	@build/$(PRESET)/bench/o2v_bench --benchmark_out=results/bench.json --benchmark_out_format=json
 
 SUITE ?= quick
 LISTS := $(if $(FIDELITY),--fidelity $(FIDELITY)) $(if $(SEEDS),--seeds $(SEEDS)) \
          $(if $(TASKS),--tasks $(TASKS)) $(if $(ALGOS),--algos $(ALGOS))
-reproduce: build  ## trains and tabulates SUITE=quick (FIDELITY= SEEDS= TASKS= ALGOS= JOBS=)
+reproduce: deps  ## trains and tabulates SUITE=quick (FIDELITY= SEEDS= TASKS= ALGOS= JOBS=)
+	@$(COMPILE) --target option2vec
 	@$(O2V) jobs $(SUITE) $(LISTS) | xargs -P $(JOBS) -d '\n' -r -n 1 scripts/run_job.sh
 	@$(O2V) summary results/$(basename $(notdir $(SUITE)))
 
@@ -56,5 +60,6 @@ lint-tidy: build  ## clang-tidy on the files changed since BASE=HEAD
 format: deps  ## clang-format on all sources
 	@find src tests bench -name '*.cc' -o -name '*.h' | xargs clang-format -i
 
-golden: build  ## rewrites the golden files; review the difference
-	@O2V_REWRITE_GOLDEN=1 build/release/tests/test_golden
+golden: deps  ## rewrites the golden files; review the difference
+	@$(COMPILE) --target test_golden
+	@O2V_REWRITE_GOLDEN=1 build/$(PRESET)/tests/test_golden

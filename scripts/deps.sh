@@ -2,9 +2,10 @@
 # Installs the Debian packages of this list that are missing; does nothing when none is.
 set -eu
 
+# libgl-dev and libopengl-dev: the CMake file of libmujoco-dev asks for them, its package does not.
 packages="
   g++ cmake ninja-build make git
-  libeigen3-dev libmujoco-dev libtomlplusplus-dev libcli11-dev nlohmann-json3-dev
+  libeigen3-dev libmujoco-dev libgl-dev libopengl-dev libtomlplusplus-dev libcli11-dev nlohmann-json3-dev
   libgtest-dev libbenchmark-dev
   clang-format clang-tidy
 "

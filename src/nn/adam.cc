@@ -30,7 +30,7 @@ double Adam::Step(std::span<const char> in_graph, IdleRule idle) {
   Check(in_graph.size() == params_.size(), "Adam: got ", in_graph.size(), " flags, not ",
         params_.size());
   const Real b1 = Real(options_.beta1), b2 = Real(options_.beta2), eps = Real(options_.eps);
-  // Rounded once: as floats 1 - 0.999f is 5e-5 off 0.001.
+  // Rounded once: in floats 1 - 0.999f is 0.00100005.
   const Real c1 = Real(1 - options_.beta1), c2 = Real(1 - options_.beta2);
   const double norm = GradNorm(params_);
   const Real scale = Real(ClipFactor(norm, options_.clip_norm));

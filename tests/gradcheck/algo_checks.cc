@@ -95,7 +95,7 @@ class Problem {
   void HiddenLayers(const std::string& body, const Mat& x);
   void VisitRelus();
   OptionPass Options(const Mat& query_embedding);
-  double OptionObjective(const OptionPass& base, const Mat& W_o, const Mat& q, LossTerms& terms);
+  double OptionObjective(const OptionPass& base, const Mat& W_o, const Mat& q);
 
   Expect Expected(int stage, const std::string& name) const;
   std::function<double()> LossOf(int stage, const std::string& name, const Batch& batch,
@@ -264,8 +264,8 @@ void Problem::VisitRelus() {
 /// L_o as a function of W_o: q is held constant, since the critic's o_hat is detached; so are,
 /// where the switches say so, P in the value loss and the query's o_hat (`base`, W_o: the
 /// unperturbed ones).
-double Problem::OptionObjective(const OptionPass& base, const Mat& W_o, const Mat& q,
-                                LossTerms& terms) {
+double Problem::OptionObjective(const OptionPass& base, const Mat& W_o, const Mat& q) {
+  LossTerms terms;
   const Switches& sw = setup_.switches;
   const OptionPass now = Options(Released(sw.o2v_prev_embed_grad) ? W_o : Named("embed.W_o").value);
   const Mat& P = Released(sw.o2v_vloss_policy) ? now.P : base.P;
@@ -311,14 +311,13 @@ Comparison Problem::Whole(int stage) {
   const std::vector<char> in_graph = algo_->InGraph(stage);
   OptionPass base;
   Mat W_o, q;
-  LossTerms composed;
   std::function<double()> objective;
   if (Option2Vec() && stage == 0) {
     W_o = Named("embed.W_o").value;
     base = Options(W_o);
     algo_->OptionValues(batch_.s,
                         Released(setup_.switches.o2v_option_in_update) ? fixed_.o : batch_.o, q);
-    objective = [&] { return OptionObjective(base, W_o, q, composed); };
+    objective = [&] { return OptionObjective(base, W_o, q); };
     const double total = objective();
     Check(std::abs(total - terms.total) < 1e-12, "option stage: the loss is ", terms.total,
           ", from the outputs ", total);
