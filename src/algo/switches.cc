@@ -11,20 +11,26 @@ namespace {
 
 SwitchInfo Choice(std::string name, std::vector<std::string> methods, Fidelity Switches::*member,
                   std::string effect) {
-  return {std::move(name), std::move(methods), std::move(effect), member, nullptr, 0, 0, 0, 0};
+  SwitchInfo info{std::move(name), std::move(methods), std::move(effect)};
+  info.choice = member;
+  return info;
 }
 
 SwitchInfo Number(std::string name, std::vector<std::string> methods, double Switches::*member,
                   double paper, double released, double low, double high, std::string effect) {
-  return {std::move(name),
-          std::move(methods),
-          std::move(effect),
-          nullptr,
-          member,
-          paper,
-          released,
-          low,
-          high};
+  SwitchInfo info{std::move(name), std::move(methods), std::move(effect)};
+  info.number = member;
+  info.paper = paper;
+  info.released = released;
+  info.low = low;
+  info.high = high;
+  return info;
+}
+
+SwitchInfo Flag(std::string name, bool Switches::*member, std::string effect) {
+  SwitchInfo info{std::move(name), {}, std::move(effect)};
+  info.flag = member;
+  return info;
 }
 
 std::vector<std::string> Names(const std::string& method) {
@@ -74,8 +80,7 @@ const std::vector<SwitchInfo>& SwitchRegistry() {
       Choice("o2v_query", {"option2vec"}, &S::o2v_query, "one query token | two, state and option"),
       Choice("o2v_prev_embed_grad", {"option2vec"}, &S::o2v_prev_embed_grad,
              "gradient to the previous option's embedding | detached"),
-      Number("contact_forces", {}, &S::contact_forces, 0, 0, 0, 1,
-             "1 fills cfrc_ext (mj_rnePostConstraint); 0 in both fidelities"),
+      Flag("contact_forces", &S::contact_forces, "on fills cfrc_ext (mj_rnePostConstraint)"),
   };
   return registry;
 }
@@ -85,7 +90,7 @@ Switches SwitchesFor(Fidelity fidelity) {
   for (const SwitchInfo& info : SwitchRegistry()) {
     if (info.choice) {
       switches.*info.choice = fidelity;
-    } else {
+    } else if (info.number) {
       switches.*info.number = fidelity == Fidelity::kPaper ? info.paper : info.released;
     }
   }
@@ -102,31 +107,40 @@ void SetSwitch(Switches& switches, const std::string& method, const std::string&
                              info == registry.end() ? "" : " does not concern " + method,
                              "; nearest: ", Nearest(name, Names(method))));
   }
-  if (info->choice) {
-    if (value != "paper" && value != "released") {
-      throw ConfigError(Concat(name, " = '", value, "': expected 'paper' or 'released'"));
+  const ConfigError bad(Concat(name, " = '", value, "': expected ", SwitchRange(*info)));
+  if (info->flag) {
+    if (value != "off" && value != "on") throw bad;
+    switches.*info->flag = value == "on";
+  } else if (value == "paper" || value == "released") {
+    const Fidelity fidelity = ParseFidelity(value);
+    if (info->choice) {
+      switches.*info->choice = fidelity;
+    } else {
+      switches.*info->number = fidelity == Fidelity::kPaper ? info->paper : info->released;
     }
-    switches.*info->choice = ParseFidelity(value);
-    return;
-  }
-  double number = value == "paper" ? info->paper : info->released;
-  if (value != "paper" && value != "released") {
+  } else {
+    double number = 0;
     const char* end = value.data() + value.size();
     const auto [stop, error] = std::from_chars(value.data(), end, number);
-    if (error != std::errc() || stop != end || !(number >= info->low && number <= info->high)) {
-      throw ConfigError(Concat(name, " = '", value,
-                               "': expected 'paper', 'released' or a number in [", info->low, ", ",
-                               info->high, "]"));
-    }
+    const bool fits =
+        error == std::errc() && stop == end && number >= info->low && number <= info->high;
+    if (!info->number || !fits) throw bad;
+    switches.*info->number = number;
   }
-  switches.*info->number = number;
 }
 
 std::string SwitchValue(const Switches& switches, const SwitchInfo& info) {
   if (info.choice) return ToString(switches.*info.choice);
+  if (info.flag) return switches.*info.flag ? "on" : "off";
   char text[32];
   const auto result = std::to_chars(text, text + sizeof text, switches.*info.number);
   return std::string(text, result.ptr);
+}
+
+std::string SwitchRange(const SwitchInfo& info) {
+  if (info.flag) return "off, on";
+  if (info.choice) return "paper, released";
+  return Concat("paper, released, [", info.low, ", ", info.high, "]");
 }
 
 }  // namespace o2v

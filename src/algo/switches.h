@@ -26,7 +26,7 @@ struct Switches {
   Fidelity o2v_init_relu = Fidelity::kPaper;         // linear | ReLU on the initial logits
   Fidelity o2v_query = Fidelity::kPaper;             // one token | two tokens
   Fidelity o2v_prev_embed_grad = Fidelity::kPaper;   // on | off
-  double contact_forces = 0;                         // 1 fills cfrc_ext; 0 in both fidelities
+  bool contact_forces = false;                       // on fills cfrc_ext; off in both
 };
 
 /// One line of the registry.
@@ -34,10 +34,12 @@ struct SwitchInfo {
   std::string name;
   std::vector<std::string> methods;  // empty: all
   std::string effect;                // what paper | released do
-  Fidelity Switches::*choice;        // one of the two is set
-  double Switches::*number;
-  double paper, released;  // values of `number`
-  double low, high;        // range of `number`
+  // One of the three is set.
+  Fidelity Switches::*choice = nullptr;  // paper | released
+  double Switches::*number = nullptr;    // paper | released | a number
+  bool Switches::*flag = nullptr;        // off | on; off in both fidelities
+  double paper = 0, released = 0;        // values of `number`
+  double low = 0, high = 0;              // range of `number`
 
   bool Concerns(const std::string& method) const;
 };
@@ -46,12 +48,14 @@ const std::vector<SwitchInfo>& SwitchRegistry();
 
 /// All switches at the setting of one fidelity.
 Switches SwitchesFor(Fidelity fidelity);
-/// Sets one switch to `paper`, `released` or, where it is numeric, a number. Throws ConfigError for
-/// an unknown name (with the nearest known one), a bad value, or a switch that does not concern
-/// `method`.
+/// Sets one switch to `paper`, `released` or, where it is numeric, a number; a flag to `off`, `on`.
+/// Throws ConfigError for an unknown name (with the nearest known one), a bad value, or a switch
+/// that does not concern `method`.
 void SetSwitch(Switches& switches, const std::string& method, const std::string& name,
                const std::string& value);
-/// The setting as text, as SetSwitch reads it: `paper`, `released`, or the number.
+/// The setting as text, as SetSwitch reads it: `paper`, `released`, `off`, `on`, or the number.
 std::string SwitchValue(const Switches& switches, const SwitchInfo& info);
+/// What SetSwitch takes, for people: "paper, released".
+std::string SwitchRange(const SwitchInfo& info);
 
 }  // namespace o2v

@@ -68,9 +68,7 @@ void ListSwitches() {
     std::string methods;
     for (const std::string& method : info.methods) methods += (methods.empty() ? "" : ",") + method;
     lines.push_back({info.name, SwitchValue(paper, info), SwitchValue(released, info),
-                     info.number ? Concat("paper, released, [", info.low, ", ", info.high, "]")
-                                 : "paper, released",
-                     methods.empty() ? "all" : methods, info.effect});
+                     SwitchRange(info), methods.empty() ? "all" : methods, info.effect});
   }
   std::cout << AlignColumns(lines);
 }

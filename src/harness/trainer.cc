@@ -322,7 +322,7 @@ class Run {
 }  // namespace
 
 RunParts PartsOf(const RunConfig& config) {
-  const EnvOptions options{.contact_forces = config.switches.contact_forces != 0};
+  const EnvOptions options{.contact_forces = config.switches.contact_forces};
   return {[=] { return MakeEnv(config.task, options); },
           [&config](const EnvSpec& spec) { return MakeRunAlgorithm(config, spec); }};
 }

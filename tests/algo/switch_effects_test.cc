@@ -86,7 +86,7 @@ std::vector<double> TrainingOnTinyRewards(const RunConfig& config) {
 
 /// Observations of an ant that falls on its legs.
 std::vector<double> AntObservations(const RunConfig& config) {
-  const auto env = MakeEnv("Ant-v2", {.contact_forces = config.switches.contact_forces != 0});
+  const auto env = MakeEnv("Ant-v2", {.contact_forces = config.switches.contact_forces});
   Rng rng(1, "ant");
   std::vector<double> obs(std::size_t(env->Spec().S)), out;
   const std::vector<double> a(std::size_t(env->Spec().A), 0.0);
@@ -118,6 +118,8 @@ Switches Flipped(Switches switches, const SwitchInfo& info) {
   if (info.choice) {
     Fidelity& choice = switches.*info.choice;
     choice = choice == Fidelity::kPaper ? Fidelity::kReleased : Fidelity::kPaper;
+  } else if (info.flag) {
+    switches.*info.flag = !(switches.*info.flag);
   } else {
     double& number = switches.*info.number;
     const double other = number == info.paper ? info.released : info.paper;

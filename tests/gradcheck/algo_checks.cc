@@ -281,10 +281,9 @@ double Problem::OptionObjective(const OptionPass& base, const Mat& W_o, const Ma
   return terms.surrogate - kEntropyWeight * terms.entropy + terms.value;
 }
 
-/// Which tensors a stage must leave alone.
-///   high (option stage): the action policy and the LayerNorm that nobody uses;
-///   low (action stage): everything but action policy and critic, W_o above all (o_hat is
-///   detached); both: the key bias only shifts the attention's logits.
+/// Which tensors a stage must leave alone. High (option stage): the action policy and the LayerNorm
+/// that nobody uses; the key bias only shifts the attention's logits. Low (action stage):
+/// everything but action policy and critic, W_o above all, since o_hat is detached. PPO: none.
 Expect Problem::Expected(int stage, const std::string& name) const {
   if (!Option2Vec()) return Expect::kGradient;
   const bool action = name.starts_with("action."), critic = name.starts_with("critic.");
@@ -386,9 +385,9 @@ void AddChecks(const std::string& name, const Setup& setup, std::vector<NamedChe
   }
 }
 
-/// The other setting of a switch; 1 where a number is the same in both fidelities.
+/// The other setting of a switch.
 std::string Flipped(const SwitchInfo& info, Fidelity fidelity) {
-  if (info.number && info.paper == info.released) return "1";
+  if (info.flag) return "on";
   return fidelity == Fidelity::kPaper ? "released" : "paper";
 }
 

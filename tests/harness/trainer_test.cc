@@ -257,9 +257,10 @@ TEST_F(Trainer, KeepsWhatADivergedRunHas) {
 TEST_F(Trainer, ShowsOneLineOnATerminalAndPlainLinesElsewhere) {
   std::ostringstream terminal;
   Train(config_, parts_, dir_ / "a", false, terminal, true);
-  EXPECT_TRUE(terminal.str().starts_with("\rstep 10/200  ")) << terminal.str();
-  EXPECT_EQ(std::count(terminal.str().begin(), terminal.str().end(), '\r'), 20);
-  EXPECT_TRUE(terminal.str().ends_with("left 0:00\x1b[K\n")) << terminal.str();
+  const std::string shown = terminal.str();
+  EXPECT_TRUE(shown.starts_with("\rstep 10/200  ")) << shown;
+  EXPECT_EQ(std::count(shown.begin(), shown.end(), '\r'), 20);
+  EXPECT_TRUE(shown.ends_with("left 0:00\x1b[K\n")) << shown;
   Start("b");
   EXPECT_EQ(progress_.str().find('\r'), std::string::npos);
   EXPECT_TRUE(progress_.str().ends_with("left 0:00\n")) << progress_.str();
