@@ -12,7 +12,8 @@ struct Error : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Bad user input: the message names the file, the line and the key where there is one. Exit code 2.
+/// Bad user input: the message names the file, the line and the key where there is one. Exit
+/// code 2.
 struct ConfigError : Error {
   using Error::Error;
 };

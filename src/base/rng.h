@@ -11,8 +11,8 @@
 namespace o2v {
 
 /// std::mt19937_64 (its sequence is fixed by the standard) with our own distributions: the standard
-/// library's are not portable and hide state. Streams are derived from (seed, name), so that drawing
-/// more in one place shifts nothing elsewhere.
+/// library's are not portable and hide state. Streams are derived from (seed, name), so that
+/// drawing more in one place shifts nothing elsewhere.
 class Rng {
  public:
   Rng(std::uint64_t seed, std::string_view stream);

@@ -13,7 +13,8 @@ bool Settings::Has(std::string_view key) const { return entries_.contains(key); 
 
 double Settings::Real(std::string_view key) const {
   const auto it = entries_.find(key);
-  if (it == entries_.end()) throw ConfigError(Concat("missing key '", key, "': a number is needed"));
+  if (it == entries_.end())
+    throw ConfigError(Concat("missing key '", key, "': a number is needed"));
   it->second.used = true;
   return it->second.value;
 }

@@ -11,8 +11,8 @@
 
 namespace o2v {
 
-/// Flat table key -> number or word. A reader asks for what it needs; a key that nobody asked for is
-/// an error of the configuration, found by `Unused` before the first step.
+/// Flat table key -> number or word. A reader asks for what it needs; a key that nobody asked for
+/// is an error of the configuration, found by `Unused` before the first step.
 class Settings {
  public:
   /// Sets or replaces a number. `origin` is where it came from ("file:line"), used in messages.
