@@ -61,5 +61,5 @@ format: deps  ## clang-format on all sources
 	@find src tests bench -name '*.cc' -o -name '*.h' | xargs clang-format -i
 
 golden: deps  ## rewrites the golden files; review the difference
-	@$(COMPILE) --target test_golden
-	@O2V_REWRITE_GOLDEN=1 build/$(PRESET)/tests/test_golden
+	@$(COMPILE) --target test64_golden
+	@O2V_REWRITE_GOLDEN=1 build/$(PRESET)/tests/test64_golden

@@ -195,7 +195,14 @@ const AttentionBlock::Masks* Option2Vec::Dropout(Index B, const FixedDraws* fixe
     const Real keep = Real(1 / (1 - switches_.o2v_dropout));
     Mat* kept[] = {&masks.attention, &masks.after_attention, &masks.inside_ffn, &masks.after_ffn};
     Check(fixed->dropout.size() == 4, "dropout: got ", fixed->dropout.size(), " masks, not 4");
-    for (std::size_t i = 0; i < 4; ++i) *kept[i] = keep * fixed->dropout[i];
+    const Index n = options_.Tokens() * B;
+    const Index rows[] = {sizes_.heads * sizes_.K, sizes_.D, sizes_.F, sizes_.D};
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Mat& given = fixed->dropout[i];
+      Check(given.rows() == rows[i] && given.cols() == n, "dropout: mask ", i, " is (",
+            given.rows(), ", ", given.cols(), "), not (", rows[i], ", ", n, ")");
+      *kept[i] = keep * given;
+    }
     return &masks;
   }
   if (switches_.o2v_dropout == 0) return nullptr;

@@ -6,16 +6,10 @@
 #include <sstream>
 
 #include "base/check.h"
+#include "base/hash.h"
 
 namespace o2v {
 namespace {
-
-/// FNV-1a, 64 bits: offset basis and prime of Fowler, Noll and Vo.
-std::uint64_t Hash(std::string_view text) {
-  std::uint64_t h = 0xcbf29ce484222325u;
-  for (const char c : text) h = (h ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
-  return h;
-}
 
 /// libstdc++ writes the engine as 312 words and the position, in decimal, space separated.
 constexpr std::size_t kEngineWords = std::mt19937_64::state_size + 1;
@@ -23,7 +17,7 @@ constexpr std::size_t kEngineWords = std::mt19937_64::state_size + 1;
 }  // namespace
 
 Rng::Rng(std::uint64_t seed, std::string_view stream) {
-  const std::uint64_t h = Hash(stream);
+  const std::uint64_t h = Fnv1a(stream);
   std::seed_seq seq{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32),
                     static_cast<std::uint32_t>(h), static_cast<std::uint32_t>(h >> 32)};
   engine_.seed(seq);
@@ -55,6 +49,10 @@ void Rng::Visit(StateVisitor& v, std::string_view name) {
     w = static_cast<std::int64_t>(u);
   }
   v.Ints(name, words.data(), words.size());
+  const std::int64_t position = words.back();
+  Check(position >= 0 && position <= std::int64_t{std::mt19937_64::state_size}, "random stream ",
+        name, ": position ", position, " of a generator of ", std::mt19937_64::state_size,
+        " words");
   std::stringstream back;
   for (const std::int64_t w : words) back << static_cast<std::uint64_t>(w) << ' ';
   back >> engine_;

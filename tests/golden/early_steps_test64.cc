@@ -1,0 +1,114 @@
+// The first steps of training, against numbers kept in tests/data/golden: what moves a learning
+// curve shows here. `make golden` rewrites the file; its difference is to be reviewed.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "algo/algorithm.h"
+#include "base/decimal.h"
+#include "base/files.h"
+
+namespace o2v {
+namespace {
+
+const std::filesystem::path kFile = std::filesystem::path(O2V_TEST_DATA) / "golden/early_steps.csv";
+
+using Numbers = std::vector<std::pair<std::string, double>>;
+
+/// Two rollouts of 24 steps of two workers, each with its update: the numbers of both updates and
+/// the states after them.
+void Run(const std::string& task, const std::string& method, Fidelity fidelity, Numbers& out) {
+  Settings hyper;
+  const std::map<std::string, double> numbers = {{"gamma", 0.99},
+                                                 {"lambda", 0.95},
+                                                 {"rollout", 24},
+                                                 {"epochs", 2},
+                                                 {"minibatch", 16},
+                                                 {"learning_rate", 3e-4},
+                                                 {"adam_beta1", 0.9},
+                                                 {"adam_beta2", 0.999},
+                                                 {"adam_eps", 1e-5},
+                                                 {"clip_norm", 0.5},
+                                                 {"ratio_clip", 0.2},
+                                                 {"hidden", 16},
+                                                 {"entropy_weight", 0},
+                                                 {"activation", 0},
+                                                 {"options", 4},
+                                                 {"embedding", 10},
+                                                 {"heads", 1},
+                                                 {"ffn", 12},
+                                                 {"init_hidden", 16},
+                                                 {"entropy_weight_option", 0.01},
+                                                 {"entropy_weight_action", 0}};
+  for (const auto& [key, value] : numbers) hyper.Set(key, value, "golden");
+  VecEnv env([&] { return MakeEnv(task, {}); }, /*workers=*/2, /*seed=*/1);
+  AlgorithmInput in;
+  in.S = env.Spec().S;
+  in.A = env.Spec().A;
+  in.workers = env.Workers();
+  in.hyper = &hyper;
+  in.switches = SwitchesFor(fidelity);
+  in.seed = 1;
+  const auto algorithm = MakeAlgorithm(method, in);
+  const std::string name = task + "/" + method + "/" + ToString(fidelity) + "/";
+  std::vector<Episode> episodes;
+  std::vector<double> stats;
+  env.Reset();
+  for (int iteration = 0; iteration < 2; ++iteration) {
+    algorithm->Collect(env, episodes);
+    algorithm->Update(stats);
+    const std::vector<std::string> columns = algorithm->StatNames();
+    ASSERT_EQ(columns.size(), stats.size());
+    for (std::size_t i = 0; i < stats.size(); ++i) {
+      out.emplace_back(name + std::to_string(iteration) + "/" + columns[i], stats[i]);
+    }
+    for (Index i = 0; i < env.States().size(); ++i) {
+      out.emplace_back(name + std::to_string(iteration) + "/s" + std::to_string(i),
+                       env.States().data()[i]);
+    }
+  }
+}
+
+Numbers Measure() {
+  Numbers out;
+  for (const char* task : {"Hopper-v2", "Swimmer-v2"}) {
+    for (const AlgorithmEntry& method : AlgorithmRegistry()) {
+      for (const Fidelity fidelity : {Fidelity::kPaper, Fidelity::kReleased}) {
+        Run(task, method.id, fidelity, out);
+      }
+    }
+  }
+  return out;
+}
+
+TEST(Golden, EarlyStepsAreThoseOnRecord) {
+  const Numbers now = Measure();
+  std::string text = "name,value\n";
+  for (const auto& [name, value] : now) text += name + "," + Decimal(value) + "\n";
+  if (std::getenv("O2V_REWRITE_GOLDEN")) WriteFileAtomically(kFile, text);
+
+  std::istringstream kept(ReadFile(kFile));
+  std::string line;
+  std::getline(kept, line);
+  ASSERT_EQ(line, "name,value");
+  std::size_t rows = 0;
+  while (std::getline(kept, line)) {
+    ASSERT_LT(rows, now.size()) << "more rows on record";
+    const std::size_t comma = line.find(',');
+    ASSERT_EQ(line.substr(0, comma), now[rows].first);
+    const double value = std::stod(line.substr(comma + 1));
+    // Large for rounding in double precision, small for a change of the mathematics or the physics.
+    EXPECT_NEAR(now[rows].second, value, 1e-6 * std::max(1.0, std::abs(value))) << now[rows].first;
+    ++rows;
+  }
+  EXPECT_EQ(rows, now.size());
+}
+
+}  // namespace
+}  // namespace o2v
