@@ -3,6 +3,7 @@
 #include <benchmark/benchmark.h>
 
 #include <chrono>
+#include <cmath>
 
 #include "bench/bound.h"
 #include "harness/config.h"
@@ -39,7 +40,7 @@ class TimedEnv final : public Env {
   double* seconds_;
 };
 
-/// One rollout and its update an iteration, after one that is not counted.
+/// One rollout and its update an iteration, after one that is not counted; the fastest is reported.
 void StepCost(benchmark::State& state, const std::string& task, const std::string& algorithm,
               const std::string& fidelity) {
   RunRequest request;
@@ -48,7 +49,7 @@ void StepCost(benchmark::State& state, const std::string& task, const std::strin
   request.fidelity = fidelity;
   request.seed = 0;
   const RunConfig config = ResolveRun(request);
-  double physics = 0, collect = 0, learning = 0;
+  double physics = 0, physics_seconds = 0, collect = 0, total_seconds = INFINITY;
   VecEnv env([&] { return std::make_unique<TimedEnv>(MakeEnv(task, {}), &physics); },
              config.workers, config.seed);
   const auto learner = MakeRunAlgorithm(config, env.Spec());
@@ -58,18 +59,25 @@ void StepCost(benchmark::State& state, const std::string& task, const std::strin
   learner->Collect(env, episodes);
   learner->Update(stats);
 
-  physics = 0;
+  // The least of the iterations, as the bound takes the least of its timings: what the machine does
+  // besides is in neither.
   const std::int64_t first = env.TotalSteps();
   for (auto _ : state) {
+    physics = 0;
     const auto start = Clock::now();
     learner->Collect(env, episodes);
-    collect += SecondsSince(start);
-    const auto middle = Clock::now();
+    const double collected = SecondsSince(start);
     learner->Update(stats);
-    learning += SecondsSince(middle);
+    const double seconds = SecondsSince(start);
+    if (seconds < total_seconds) {
+      total_seconds = seconds;
+      collect = collected;
+      physics_seconds = physics;
+    }
   }
 
-  const double scale = 1e6 / double(env.TotalSteps() - first);  // [us an environment step]
+  // [us an environment step]
+  const double scale = 1e6 * double(state.iterations()) / double(env.TotalSteps() - first);
   const int S = env.Spec().S, A = env.Spec().A;
   double products = 0, mflop = 0;
   for (const Product& p : Products(config, S, A)) {
@@ -77,11 +85,11 @@ void StepCost(benchmark::State& state, const std::string& task, const std::strin
     mflop += p.MflopPerStep();
   }
   const double adam = 1e6 * AdamSecondsPerEntry() * AdamEntriesPerStep(config, S, A);
-  const double total = (collect + learning) * scale, bound = physics * scale + products + adam;
+  const double total = total_seconds * scale, bound = physics_seconds * scale + products + adam;
   state.counters["total_us"] = total;
-  state.counters["physics_us"] = physics * scale;
-  state.counters["inference_us"] = (collect - physics) * scale;
-  state.counters["learning_us"] = learning * scale;
+  state.counters["physics_us"] = physics_seconds * scale;
+  state.counters["inference_us"] = (collect - physics_seconds) * scale;
+  state.counters["learning_us"] = (total_seconds - collect) * scale;
   state.counters["bound_us"] = bound;
   state.counters["bound_products_us"] = products;
   state.counters["bound_adam_us"] = adam;
@@ -100,7 +108,7 @@ void RegisterStepBenches() {
         const std::string id = task.id, method = algorithm.id;
         benchmark::RegisterBenchmark(
             name.c_str(), [=](benchmark::State& state) { StepCost(state, id, method, fidelity); })
-            ->Iterations(2)
+            ->Iterations(5)
             ->Unit(benchmark::kMillisecond);
       }
     }

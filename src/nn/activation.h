@@ -1,5 +1,6 @@
 #pragma once
-// Elementwise functions. Each backward takes the output, so that no input is kept.
+// Elementwise functions. Each backward takes the output, so that no input is kept. Columns of the
+// arguments lie together (whole matrices or blocks of whole columns).
 
 #include "base/types.h"
 

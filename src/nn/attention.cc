@@ -1,6 +1,8 @@
 #include "nn/attention.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "base/check.h"
 #include "nn/init.h"
@@ -61,23 +63,27 @@ void MemoryAttention::Forward(const ConstMatRef& x, const Memory& m, const Mat* 
   const Index K = m.keys.cols();
   c.alpha.resize(heads * K, x.cols());
   SetAtB(m.score_map, x, c.alpha);
-  for (Index j = 0; j < x.cols(); ++j) {
-    for (Index h = 0; h < heads; ++h) {
-      auto a = c.alpha.col(j).segment(h * K, K);
-      a += m.score_bias.col(0).segment(h * K, K);
-      a.array() -= a.maxCoeff();
-    }
+  // Softmax over the K scores of each sample and head, which lie together: segment i. Raw loops,
+  // as K is too short for block expressions.
+  const Real* bias = m.score_bias.data();
+  const Index segments = heads * x.cols();
+  for (Index i = 0; i < segments; ++i) {
+    Real* a = c.alpha.data() + i * K;
+    const Real* bias_h = bias + i % heads * K;
+    Real largest = -std::numeric_limits<Real>::infinity();
+    for (Index k = 0; k < K; ++k) largest = std::max(largest, a[k] += bias_h[k]);
+    for (Index k = 0; k < K; ++k) a[k] -= largest;
   }
   c.alpha = c.alpha.array().exp();
-  for (Index j = 0; j < x.cols(); ++j) {
-    for (Index h = 0; h < heads; ++h) {
-      auto a = c.alpha.col(j).segment(h * K, K);
-      a /= a.sum();
-    }
+  for (Index i = 0; i < segments; ++i) {
+    Real* a = c.alpha.data() + i * K;
+    Real sum = 0;
+    for (Index k = 0; k < K; ++k) sum += a[k];
+    for (Index k = 0; k < K; ++k) a[k] /= sum;
   }
   if (mask) c.alpha_dropped = c.alpha.cwiseProduct(*mask);
-  SetAB(m.out_map, mask ? c.alpha_dropped : c.alpha, y);
-  y.colwise() += b_out.value.col(0);
+  y.colwise() = b_out.value.col(0);
+  AddAB(m.out_map, mask ? c.alpha_dropped : c.alpha, y);
 }
 
 void MemoryAttention::Backward(const ConstMatRef& x, const Mat& E, const Memory& m, const Mat* mask,
@@ -90,13 +96,12 @@ void MemoryAttention::Backward(const ConstMatRef& x, const Mat& E, const Memory&
   SetABt(dy, mask ? c.alpha_dropped : c.alpha, c.d_out_map);
   SetAtB(m.out_map, dy, c.d_alpha);
   if (mask) c.d_alpha.array() *= mask->array();
-  for (Index j = 0; j < dy.cols(); ++j) {  // softmax of each head: ds = alpha (t - alpha . t)
-    for (Index h = 0; h < heads; ++h) {
-      const auto a = c.alpha.col(j).segment(h * K, K).array();
-      auto t = c.d_alpha.col(j).segment(h * K, K).array();
-      const Real mean = (a * t).sum();
-      t = a * (t - mean);
-    }
+  for (Index i = 0; i < heads * dy.cols(); ++i) {  // softmax: ds = alpha (t - alpha . t)
+    const Real* a = c.alpha.data() + i * K;
+    Real* t = c.d_alpha.data() + i * K;
+    Real mean = 0;
+    for (Index k = 0; k < K; ++k) mean += a[k] * t[k];
+    for (Index k = 0; k < K; ++k) t[k] = a[k] * (t[k] - mean);
   }
   c.d_score_map.resize(D, heads * K);
   SetAB(m.score_map, c.d_alpha, dx);

@@ -7,6 +7,27 @@
 #include "nn/init.h"
 
 namespace o2v {
+namespace {
+
+/// y := x + mask * y, in one pass; mask null: ones.
+void AddDropped(const ConstMatRef& x, const Mat* mask, Mat& y) {
+  if (mask) {
+    y.array() = x.array() + mask->array() * y.array();
+  } else {
+    y += x;
+  }
+}
+
+/// out := mask * d: the backward of dropout.
+void CopyDropped(const Mat& d, const Mat* mask, Mat& out) {
+  if (mask) {
+    out = d.cwiseProduct(*mask);
+  } else {
+    out = d;
+  }
+}
+
+}  // namespace
 
 void AttentionBlock::Masks::Resize(Index HK, Index D, Index F, Index n) {
   attention.resize(HK, n);
@@ -55,16 +76,14 @@ void AttentionBlock::Forward(const ConstMatRef& x, const MemoryAttention::Memory
   c.out.resize(x.rows(), n);
   c.hidden.resize(ffn0.W.value.rows(), n);
   attention.Forward(x, memory, masks ? &masks->attention : nullptr, c.attention, c.y);
-  if (masks) c.y.array() *= masks->after_attention.array();
-  c.y += x;
+  AddDropped(x, masks ? &masks->after_attention : nullptr, c.y);
   ln2.Forward(c.y, c.ln2, c.y);
 
   ffn0.Multiply(c.y, c.hidden);
   BiasActivate(Activation::kRelu, ffn0.b.value, c.hidden);
   if (masks) c.hidden.array() *= masks->inside_ffn.array();
   ffn1.Forward(c.hidden, c.out);
-  if (masks) c.out.array() *= masks->after_ffn.array();
-  c.out += c.y;
+  AddDropped(c.y, masks ? &masks->after_ffn : nullptr, c.out);
   ln3.Forward(c.out, c.ln3, c.out);
   ln_final.Forward(c.out, c.ln_final, c.out);
 }
@@ -76,8 +95,8 @@ void AttentionBlock::Backward(const ConstMatRef& x, const Mat& E,
   c.d_hidden.resize(c.hidden.rows(), x.cols());
   ln_final.Backward(c.ln_final, dout, dout);
   ln3.Backward(c.ln3, dout, dout);
-  c.d_out = dout;  // towards the FFN; dout itself goes on along the residual
-  if (masks) c.d_out.array() *= masks->after_ffn.array();
+  // Towards the FFN; dout itself goes on along the residual.
+  CopyDropped(dout, masks ? &masks->after_ffn : nullptr, c.d_out);
   ffn1.AddGrad(c.hidden, c.d_out);
   ffn1.BackwardInput(c.d_out, c.d_hidden);
   // A dropped unit is 0 in `hidden`, so ReLU's mask drops its gradient as well; a kept one is
@@ -88,8 +107,7 @@ void AttentionBlock::Backward(const ConstMatRef& x, const Mat& E,
   ffn0.BackwardInput(c.d_hidden, c.d_y);
   c.d_y += dout;
   ln2.Backward(c.ln2, c.d_y, c.d_y);
-  c.d_out = c.d_y;  // towards the attention
-  if (masks) c.d_out.array() *= masks->after_attention.array();
+  CopyDropped(c.d_y, masks ? &masks->after_attention : nullptr, c.d_out);  // to the attention
   attention.Backward(x, E, memory, masks ? &masks->attention : nullptr, c.attention, c.d_out, dx,
                      dE);
   dx += c.d_y;

@@ -5,14 +5,19 @@
 
 namespace o2v {
 
+void Linear::CheckInput(const ConstMatRef& x) const {
+  Check(x.rows() == W.value.cols(), W.name, ": got x (", x.rows(), ", ", x.cols(), ") for W (",
+        W.value.rows(), ", ", W.value.cols(), ")");
+}
+
 void Linear::Forward(const ConstMatRef& x, MatRef y) const {
-  Multiply(x, y);
-  y.colwise() += b.value.col(0);
+  CheckInput(x);
+  y.colwise() = b.value.col(0);
+  AddAB(W.value, x, y);
 }
 
 void Linear::Multiply(const ConstMatRef& x, MatRef y) const {
-  Check(x.rows() == W.value.cols(), W.name, ": got x (", x.rows(), ", ", x.cols(), ") for W (",
-        W.value.rows(), ", ", W.value.cols(), ")");
+  CheckInput(x);
   SetAB(W.value, x, y);
 }
 

@@ -29,6 +29,9 @@ struct Linear {
   void BackwardInput(const ConstMatRef& dy, MatRef dx) const;
 
   std::vector<Param*> Params() { return {&W, &b}; }
+
+ private:
+  void CheckInput(const ConstMatRef& x) const;
 };
 
 }  // namespace o2v

@@ -18,12 +18,15 @@ void Batch::Resize(Index S, Index A, Index B) {
 }
 
 void Gather(const Batch& all, std::span<const int> rows, Batch& out) {
-  out.Resize(all.s.rows(), all.a.rows(), static_cast<Index>(rows.size()));
+  const Index S = all.s.rows(), A = all.a.rows();
+  out.Resize(S, A, static_cast<Index>(rows.size()));
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Index to = static_cast<Index>(i), from = rows[i];
     const std::size_t row = static_cast<std::size_t>(from);
-    out.s.col(to) = all.s.col(from);
-    out.a.col(to) = all.a.col(from);
+    const Real* s = all.s.data() + from * S;  // short columns: plain loops beat block copies
+    const Real* a = all.a.data() + from * A;
+    for (Index k = 0; k < S; ++k) out.s(k, to) = s[k];
+    for (Index k = 0; k < A; ++k) out.a(k, to) = a[k];
     out.o[i] = all.o[row];
     out.o_prev[i] = all.o_prev[row];
     out.init[i] = all.init[row];
