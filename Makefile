@@ -61,5 +61,6 @@ format: deps  ## clang-format on all sources
 	@find src tests bench -name '*.cc' -o -name '*.h' | xargs clang-format -i
 
 golden: deps  ## rewrites the golden files; review the difference
-	@$(COMPILE) --target test64_golden
+	@$(COMPILE) --target test64_golden test_harness
 	@O2V_REWRITE_GOLDEN=1 build/$(PRESET)/tests/test64_golden
+	@O2V_REWRITE_GOLDEN=1 build/$(PRESET)/tests/test_harness --gtest_filter=ParamTable.IsTheOneOnRecord

@@ -6,15 +6,18 @@
 #include <map>
 #include <tuple>
 
+#include "base/check.h"
+#include "harness/param_table.h"
+
 namespace o2v::bench {
 namespace {
 
-/// Adds the products of a linear layer (n_in -> n_out) on B columns: forward, and where it learns
-/// the weight gradient and, unless it is a first layer, the input gradient.
+/// Adds the products of layers on B columns.
 struct Layers {
   std::vector<Product>& out;
   double per_step;  // passes an environment step
 
+  // ---- A linear layer (n_in -> n_out).
   void Forward(const std::string& what, Index n_in, Index n_out, Index B) {
     out.push_back({what + " forward", n_out, n_in, B, per_step});
   }
@@ -24,50 +27,213 @@ struct Layers {
   void Input(const std::string& what, Index n_in, Index n_out, Index B) {
     out.push_back({what + " input gradient", n_in, n_out, B, per_step});
   }
-  void All(const std::string& what, Index n_in, Index n_out, Index B) {
-    Forward(what, n_in, n_out, B);
-    Weight(what, n_in, n_out, B);
-    Input(what, n_in, n_out, B);
+
+  // ---- A body and its head (n_in -> h -> h -> n_out).
+  void NetForward(const std::string& name, Index n_in, Index h, Index n_out, Index B) {
+    Forward(name + " layer 0", n_in, h, B);
+    Forward(name + " layer 1", h, h, B);
+    Forward(name + " head", h, n_out, B);
+  }
+  void NetGradients(const std::string& name, Index n_in, Index h, Index n_out, Index B) {
+    Weight(name + " layer 0", n_in, h, B);
+    Weight(name + " layer 1", h, h, B);
+    Input(name + " layer 1", h, h, B);
+    Weight(name + " head", h, n_out, B);
+    Input(name + " head", h, n_out, B);
+  }
+  void NetBoth(const std::string& name, Index n_in, Index h, Index n_out, Index B) {
+    NetForward(name, n_in, h, n_out, B);
+    NetGradients(name, n_in, h, n_out, B);
   }
 };
 
 /// The sizes of a run.
 struct Sizes {
-  Index S, A, N, B, h;
-  double epochs;
-  explicit Sizes(const RunConfig& c, int s, int a)
-      : S(s),
-        A(a),
-        N(c.workers),
+  Index S, A, N, h;
+  Sizes(const RunConfig& c, int s, int a) : S(s), A(a), N(c.workers), h(c.hyper.Int("hidden")) {}
+};
+
+/// Sizes of a run with minibatches.
+struct PpoSizes : Sizes {
+  Index B;
+  double rollout, values, update;  // passes of N, B, B columns an environment step
+  PpoSizes(const RunConfig& c, int s, int a)
+      : Sizes(c, s, a),
         B(c.hyper.Int("minibatch")),
-        h(c.hyper.Int("hidden")),
-        epochs(c.hyper.Real("epochs")) {}
-  double PerMinibatch() const { return epochs / double(B); }
+        rollout(1.0 / double(N)),
+        values(1.0 / double(B)),
+        update(c.hyper.Real("epochs") / double(B)) {}
 };
 
 std::vector<Product> PpoProducts(const RunConfig& config, int S, int A) {
-  const Sizes z(config, S, A);
+  const PpoSizes z(config, S, A);
   std::vector<Product> out;
-  const auto net = [&](Layers layers, const std::string& name, Index n_out, Index B, bool learn) {
-    layers.Forward(name + " layer 0", z.S, z.h, B);
-    layers.Forward(name + " layer 1", z.h, z.h, B);
-    layers.Forward(name + " head", z.h, n_out, B);
-    if (!learn) return;
-    layers.Weight(name + " layer 0", z.S, z.h, B);
-    layers.Weight(name + " layer 1", z.h, z.h, B);
-    layers.Input(name + " layer 1", z.h, z.h, B);
-    layers.Weight(name + " head", z.h, n_out, B);
-    layers.Input(name + " head", z.h, n_out, B);
-  };
-  net({out, 1.0 / double(z.N)}, "rollout actor", z.A, z.N, false);
-  net({out, 1.0 / double(z.B)}, "values critic", 1, z.B, false);
-  net({out, z.PerMinibatch()}, "update actor", z.A, z.B, true);
-  net({out, z.PerMinibatch()}, "update critic", 1, z.B, true);
+  Layers{out, z.rollout}.NetForward("rollout actor", z.S, z.h, z.A, z.N);
+  Layers{out, z.values}.NetForward("values critic", z.S, z.h, 1, z.B);
+  Layers{out, z.update}.NetBoth("update actor", z.S, z.h, z.A, z.B);
+  Layers{out, z.update}.NetBoth("update critic", z.S, z.h, 1, z.B);
   return out;
 }
 
-std::vector<Product> Option2VecProducts(const RunConfig& config, int S, int A) {
+// ---- Methods with one network an option --------------------------------------------------------
+
+using Pass = void (Layers::*)(const std::string&, Index n_in, Index h, Index n_out, Index B);
+constexpr Pass kForward = &Layers::NetForward, kGradients = &Layers::NetGradients,
+               kBoth = &Layers::NetBoth;
+
+/// Products of the networks of spec 2.3: `per_step` passes of B columns.
+struct OptionProducts {
+  const Index S, h, K;
+  const bool all_betas;  // beta_index = released asks for the terminations of all options
+  std::vector<Product> out;
+
+  OptionProducts(const RunConfig& c, const Sizes& z)
+      : S(z.S),
+        h(z.h),
+        K(c.hyper.Int("options")),
+        all_betas(c.switches.beta_index == Fidelity::kReleased) {}
+
+  /// A network that all options share: master, critic.
+  void Shared(Pass pass, double per_step, const std::string& name, Index n_out, Index B) {
+    (Layers{out, per_step}.*pass)(name, S, h, n_out, B);
+  }
+  /// Networks of the options, each sample through that of one: K groups of B / K columns.
+  void One(Pass pass, double per_step, const std::string& name, Index n_out, Index B) {
+    const Index columns = std::max<Index>(1, B / K);
+    Shared(pass, per_step * double(B) / double(columns), name, n_out, columns);
+  }
+  /// Networks of the options, each sample through all K.
+  void All(Pass pass, double per_step, const std::string& name, Index n_out, Index B) {
+    Shared(pass, per_step * double(K), name, n_out, B);
+  }
+  /// The terminations that the call-and-return policy asks for.
+  void Terminations(Pass pass, double per_step, const std::string& name, Index B) {
+    all_betas ? All(pass, per_step, name, 1, B) : One(pass, per_step, name, 1, B);
+  }
+};
+
+/// DAC's two stages around an option policy: option_policy(p, pass, per_step, stage, B).
+template <typename OptionPolicy>
+std::vector<Product> DoubleActorCriticProducts(const RunConfig& config, int S, int A,
+                                               OptionPolicy&& option_policy) {
+  const PpoSizes z(config, S, A);
+  OptionProducts p(config, z);
+  option_policy(p, kForward, z.rollout, "rollout ", z.N);
+  p.One(kForward, z.rollout, "rollout options", z.A, z.N);
+  p.Shared(kForward, z.values, "values critic", p.K, z.B);
+  option_policy(p, kBoth, z.update, "high stage ", z.B);
+  p.Shared(kBoth, z.update, "high stage critic", p.K, z.B);
+  p.One(kBoth, z.update, "low stage options", z.A, z.B);
+  p.Shared(kBoth, z.update, "low stage critic", p.K, z.B);
+  return p.out;
+}
+
+std::vector<Product> DacPpoProducts(const RunConfig& config, int S, int A) {
+  return DoubleActorCriticProducts(
+      config, S, A,
+      [](OptionProducts& p, Pass pass, double per_step, const std::string& stage, Index B) {
+        p.Shared(pass, per_step, stage + "master", p.K, B);
+        p.Terminations(pass, per_step, stage + "terminations", B);
+      });
+}
+
+std::vector<Product> DacOneStepProducts(const RunConfig& config, int S, int A) {
+  const bool number = config.switches.onestep_index == Fidelity::kReleased;
+  const bool swapped = config.switches.onestep_roles == Fidelity::kReleased;
+  const Index h_y = config.hyper.Int("ynet_hidden");
+  return DoubleActorCriticProducts(
+      config, S, A,
+      [=](OptionProducts& p, Pass pass, double per_step, const std::string& stage, Index B) {
+        Layers l{p.out, per_step};
+        if (!swapped) {  // a one-hot o' is a column of the weights, its number an input
+          (l.*pass)(stage + "option policy", p.S + (number ? 1 : 0), p.h, p.K, B);
+          return;
+        }
+        // The net y. The other one serves first states alone: too few to count.
+        l.Forward(stage + "y layer 0", p.S, h_y, B);
+        l.Forward(stage + "y layer 1", h_y, p.K, B);
+        if (pass == kForward) return;
+        l.Weight(stage + "y layer 0", p.S, h_y, B);
+        l.Weight(stage + "y layer 1", h_y, p.K, B);
+        l.Input(stage + "y layer 1", h_y, p.K, B);
+      });
+}
+
+std::vector<Product> AhpPpoProducts(const RunConfig& config, int S, int A) {
+  // The master policy matters only where the option stops: beta = 1/2 before the terminations have
+  // learnt.
+  constexpr double kStops = 0.5;
+  const PpoSizes z(config, S, A);
+  OptionProducts p(config, z);
+  p.Shared(kForward, kStops * z.rollout, "rollout master", p.K, z.N);
+  p.One(kForward, z.rollout, "rollout terminations", 1, z.N);
+  p.One(kForward, z.rollout, "rollout options", z.A, z.N);
+  p.Shared(kForward, z.values, "values critic", p.K + 1, z.B);
+  p.Shared(kBoth, kStops * z.update, "update master", p.K, z.B);
+  p.One(kBoth, z.update, "update terminations", 1, z.B);
+  p.One(kBoth, z.update, "update options", z.A, z.B);
+  p.Shared(kBoth, z.update, "update critic", p.K + 1, z.B);
+  return p.out;
+}
+
+std::vector<Product> PpocProducts(const RunConfig& config, int S, int A) {
+  const PpoSizes z(config, S, A);
+  OptionProducts p(config, z);
+  p.Shared(kForward, z.rollout, "rollout master", p.K, z.N);
+  p.Terminations(kForward, z.rollout, "rollout terminations", z.N);
+  p.One(kForward, z.rollout, "rollout options", z.A, z.N);
+  p.Shared(kForward, z.values, "values critic", p.K, z.B);
+  p.Shared(kBoth, z.update, "update master", p.K, z.B);
+  p.One(kBoth, z.update, "update terminations", 1, z.B);  // of o' alone, whatever beta_index
+  if (p.all_betas && config.switches.ppoc_master_weight == Fidelity::kPaper) {
+    p.One(kForward, z.update, "update terminations of o", 1, z.B);
+  }
+  p.One(kBoth, z.update, "update options", z.A, z.B);
+  p.Shared(kBoth, z.update, "update critic", p.K, z.B);
+  return p.out;
+}
+
+std::vector<Product> OcProducts(const RunConfig& config, int S, int A) {
   const Sizes z(config, S, A);
+  OptionProducts p(config, z);
+  const Index n = config.hyper.Int("rollout") * z.N;
+  const double rollout = 1.0 / double(z.N), update = 1.0 / double(n);
+  p.Shared(kForward, rollout, "rollout critic", p.K, z.N);
+  p.Terminations(kForward, rollout, "rollout terminations", z.N);
+  p.One(kForward, rollout, "rollout options", z.A, z.N);
+  p.Shared(kForward, update, "target critic", p.K, z.N);
+  p.One(kForward, update, "target terminations", 1, z.N);
+  p.Shared(kGradients, update, "update critic", p.K, n);
+  p.One(kGradients, update, "update terminations", 1, n);
+  p.One(kGradients, update, "update options", z.A, n);
+  return p.out;
+}
+
+std::vector<Product> IopgProducts(const RunConfig& config, int S, int A) {
+  constexpr Index kBlock = 64;  // steps of an episode that are learnt from together
+  const Sizes z(config, S, A);
+  OptionProducts p(config, z);
+  const bool terminations = config.switches.iopg_init_flag == Fidelity::kPaper;
+  const double update = 1.0 / double(kBlock);
+  // Each worker acts with its own copy. Acting has passed through one option of K.
+  const double others = update * double(p.K - 1) / double(p.K);
+  p.Shared(kForward, 1, "rollout master", p.K, 1);
+  if (terminations) p.Terminations(kForward, 1, "rollout terminations", 1);
+  p.One(kForward, 1, "rollout options", z.A, 1);
+  p.Shared(kGradients, update, "update master", p.K, kBlock);
+  p.Shared(kBoth, update, "update critic", 1, kBlock);  // v is the first entry of q
+  p.All(kForward, others, "update options", z.A, kBlock);
+  p.All(kGradients, update, "update options", z.A, kBlock);
+  if (!terminations) return p.out;
+  if (!p.all_betas) p.All(kForward, others, "update terminations", 1, kBlock);
+  p.All(kGradients, update, "update terminations", 1, kBlock);
+  return p.out;
+}
+
+// ---- Option2Vec --------------------------------------------------------------------------------
+
+std::vector<Product> Option2VecProducts(const RunConfig& config, int S, int A) {
+  const PpoSizes z(config, S, A);
   const Index D = config.hyper.Int("embedding"), K = config.hyper.Int("options"),
               F = config.hyper.Int("ffn"), HK = config.hyper.Int("heads") * K;
   const bool scalar = config.switches.o2v_critic == Fidelity::kPaper;
@@ -119,19 +285,20 @@ std::vector<Product> Option2VecProducts(const RunConfig& config, int S, int A) {
     l.Weight(name + " head", z.h, n_out, m);
     l.Input(name + " head", z.h, n_out, m);
   };
-  const double rollout = 1.0 / double(z.N), update = z.PerMinibatch();
-  options({out, rollout}, "rollout options", z.N, false);
-  action({out, rollout}, "rollout action", z.N, false);
-  critic({out, 1.0 / double(z.B)}, "values critic", z.B, scalar ? K * z.B : z.B, false);
-  options({out, update}, "option stage options", z.B, true);
-  critic({out, update}, "option stage critic", z.B, scalar ? K * z.B : z.B, true);
+  options({out, z.rollout}, "rollout options", z.N, false);
+  action({out, z.rollout}, "rollout action", z.N, false);
+  critic({out, z.values}, "values critic", z.B, scalar ? K * z.B : z.B, false);
+  options({out, z.update}, "option stage options", z.B, true);
+  critic({out, z.update}, "option stage critic", z.B, scalar ? K * z.B : z.B, true);
   if (config.switches.o2v_option_in_update == Fidelity::kReleased) {
-    options({out, update}, "action stage options", z.B, false);
+    options({out, z.update}, "action stage options", z.B, false);
   }
-  action({out, update}, "action stage action", z.B, true);
-  critic({out, update}, "action stage critic", z.B, z.B, true);
+  action({out, z.update}, "action stage action", z.B, true);
+  critic({out, z.update}, "action stage critic", z.B, z.B, true);
   return out;
 }
+
+// ---- Timings -----------------------------------------------------------------------------------
 
 /// CPU seconds a call, the least of several timed batches of calls.
 template <typename Work>
@@ -158,24 +325,39 @@ double Seconds(Work&& work) {
 }  // namespace
 
 std::vector<Product> Products(const RunConfig& config, int S, int A) {
-  return config.algorithm == "ppo" ? PpoProducts(config, S, A) : Option2VecProducts(config, S, A);
+  using List = std::vector<Product> (*)(const RunConfig&, int, int);
+  static const std::map<std::string, List> lists = {{"option2vec", Option2VecProducts},
+                                                    {"dac_onestep", DacOneStepProducts},
+                                                    {"dac_ppo", DacPpoProducts},
+                                                    {"ahp_ppo", AhpPpoProducts},
+                                                    {"iopg", IopgProducts},
+                                                    {"ppoc", PpocProducts},
+                                                    {"oc", OcProducts},
+                                                    {"ppo", PpoProducts}};
+  const auto list = lists.find(config.algorithm);
+  Check(list != lists.end(), config.algorithm, ": no list of products");
+  return list->second(config, S, A);
 }
 
-double AdamEntriesPerStep(const RunConfig& config, int S, int A) {
+double AdamEntriesPerStep(const RunConfig& config, int S, int A, double episode_length) {
   EnvSpec spec;
   spec.S = S;
   spec.A = A;
   const auto algorithm = MakeRunAlgorithm(config, spec);
   const std::vector<Param*> params = algorithm->Params();
   const bool idle_move = config.switches.adam_idle == Fidelity::kReleased;
-  double entries = 0;
+  const std::vector<char> used = InAnyGraph(*algorithm);
+  double entries = 0;  // in a step of each stage
   for (int stage = 0; stage < int(algorithm->Stages().size()); ++stage) {
-    const std::vector<char> in_graph = algorithm->InGraph(stage);
+    const std::vector<char> in_graph = idle_move ? used : algorithm->InGraph(stage);
     for (std::size_t i = 0; i < params.size(); ++i) {
-      if (in_graph[i] || idle_move) entries += double(params[i]->value.size());
+      if (in_graph[i]) entries += double(params[i]->value.size());
     }
   }
-  return entries * config.hyper.Real("epochs") / config.hyper.Real("minibatch");
+  const Settings& hyper = config.hyper;
+  if (hyper.Has("minibatch")) return entries * hyper.Real("epochs") / hyper.Real("minibatch");
+  if (hyper.Has("rollout")) return entries / (hyper.Real("rollout") * config.workers);  // OC
+  return entries / episode_length;                                                      // IOPG
 }
 
 double ProductSeconds(Index m, Index k, Index n) {

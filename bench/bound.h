@@ -20,13 +20,17 @@ struct Product {
 };
 
 /// The products of inference, values and update that cannot be skipped, after all that is shared by
-/// the batch (keys, values, tables of the K embeddings) has been taken out of it. First layers need
-/// no input gradient; the action stage of `paper` needs no option policy, that of `released` its
-/// forward pass.
+/// the batch (keys, values, tables of the K embeddings, columns of one-hot inputs) has been taken
+/// out of it. First layers need no input gradient; the action stage of `paper` needs no option
+/// policy, that of `released` its forward pass. A sample passes through the networks of its own
+/// option; the options are taken to be executed equally often. What acting has computed with the
+/// weights that the update starts from (OC, IOPG) is not computed again. Throws Error for a method
+/// without a list.
 std::vector<Product> Products(const RunConfig& config, int S, int A);
 
-/// Entries that Adam visits an environment step.
-double AdamEntriesPerStep(const RunConfig& config, int S, int A);
+/// Entries that Adam visits an environment step. episode_length [steps] is the mean one of a method
+/// that learns once an episode.
+double AdamEntriesPerStep(const RunConfig& config, int S, int A, double episode_length);
 
 /// CPU seconds of one bare Eigen product of these shapes on data that stays in cache; measured
 /// once.

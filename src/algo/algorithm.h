@@ -21,6 +21,7 @@ namespace o2v {
 struct AlgorithmInput {
   int S = 0, A = 0;                 // sizes of the task
   int workers = 1;                  // N
+  int time_limit = 1000;            // [steps] of the task's episodes
   const Settings* hyper = nullptr;  // hyper-parameters: keys of paper_configs/algo/<method>.toml
   Switches switches;
   std::uint64_t seed = 0;  // of all its random streams
@@ -29,10 +30,13 @@ struct AlgorithmInput {
 /// Terms of a stage's loss on one batch, as optimised: total is what the gradients belong to.
 struct LossTerms {
   double total = 0;
-  double surrogate = 0;  // clipped surrogate, with its minus sign
-  double value = 0;      // with the factor 1/2
-  double entropy = 0;    // mean entropy, positive for a distribution
-  double kl = 0;         // mean of r - 1 - ln r, r the probability ratio (Schulman's k3 estimate)
+  double surrogate = 0;    // clipped surrogate, or the plain policy gradient term of OC and IOPG,
+                           // with its minus sign
+  double value = 0;        // with the factor 1/2
+  double entropy = 0;      // mean entropy, positive for a distribution
+  double termination = 0;  // PPOC, OC: penalty on terminations
+  double master = 0;       // PPOC: policy gradient term of the master policy, with its minus sign
+  double kl = 0;           // mean of r - 1 - ln r, r the probability ratio (Schulman's k3 estimate)
   double clip_fraction = 0;  // share of samples with a ratio outside [1-c, 1+c]
 };
 

@@ -5,7 +5,6 @@
 #include "base/check.h"
 #include "dist/categorical.h"
 #include "dist/diag_gaussian.h"
-#include "rollout/minibatch.h"
 
 namespace o2v {
 namespace {
@@ -92,10 +91,9 @@ class Option2Vec final : public Algorithm {
   CacheByWidth<Cache> caches_;
   Mat a_;  // (A, N)
   Transition transition_;
-  std::vector<int> order_;
-  Batch minibatch_, rest_;
+  Minibatches minibatches_;
+  OptionUsage usage_;
   LossMeans means_[2];
-  std::vector<double> executed_, begun_;  // (K) steps of each option in the rollout; its segments
 };
 
 Option2VecSizes ReadSizes(const AlgorithmInput& in) {
@@ -125,7 +123,9 @@ Option2Vec::Option2Vec(const AlgorithmInput& in)
       shuffle_rng_(in.seed, "shuffle"),
       order_rng_(in.seed, "order"),
       high_(in.workers, hyper_.rollout),
-      low_(in.workers, hyper_.rollout) {
+      low_(in.workers, hyper_.rollout),
+      minibatches_(Index(in.workers) * hyper_.rollout),
+      usage_(sizes_.K) {
   Rng init(in.seed, "init");
   const OptionPolicyNet::Form form{.two_tokens = !Paper(switches_.o2v_query),
                                    .init_relu = !Paper(switches_.o2v_init_relu),
@@ -156,9 +156,6 @@ Option2Vec::Option2Vec(const AlgorithmInput& in)
   mask_ = MatD::Ones(N_, hyper_.rollout);
   o_prev_.assign(std::size_t(N_), 0);
   not_initial_.assign(std::size_t(N_), 0);
-  order_.resize(std::size_t(n));
-  executed_.assign(std::size_t(sizes_.K), 0);
-  begun_ = executed_;
 }
 
 std::vector<Param*> Option2Vec::Params() {
@@ -222,8 +219,7 @@ void Option2Vec::Collect(VecEnv& env, std::vector<Episode>& episodes) {
   Cache& c = caches_(N_);
   const Mat &P = c.options.P, &q = c.all.q;
   c.o.resize(std::size_t(N_));
-  std::fill(executed_.begin(), executed_.end(), 0);
-  std::fill(begun_.begin(), begun_.end(), 0);
+  usage_.Clear();
   for (int t = 0; t < hyper_.rollout; ++t) {
     const Index column = Index(t) * N_;
     const Mat& s = env.States();
@@ -237,29 +233,20 @@ void Option2Vec::Collect(VecEnv& env, std::vector<Episode>& episodes) {
     rollout_.a.middleCols(column, N_) = a_;
     rollout_.low.logp_old.segment(column, N_) = c.logp;
     rollout_P_.middleCols(column, N_) = P;
-    for (std::size_t i = 0; i < std::size_t(N_); ++i) {
-      const std::size_t row = std::size_t(column) + i;
-      const int o = c.o[i];
-      rollout_.o[row] = o;
-      rollout_.o_prev[row] = o_prev_[i];
-      rollout_.init[row] = env.Init()[i];
-      rollout_.high.logp_old(Index(row)) = c.options.log_P(o, Index(i));
-      executed_[std::size_t(o)] += 1;
-      begun_[std::size_t(o)] += env.Init()[i] || o != o_prev_[i];
-      o_prev_[i] = o;
+    for (Index i = 0; i < N_; ++i) {
+      rollout_.high.logp_old(column + i) = c.options.log_P(c.o[std::size_t(i)], i);
     }
+    RecordOptions(column, c.o, env.Init(), o_prev_, rollout_, usage_);
 
     env.Step(a_, transition_, episodes);
     high_.r.col(t) = low_.r.col(t) = transition_.r;
-    bool bootstrap = false;
-    for (std::size_t i = 0; i < std::size_t(N_); ++i) {
-      const bool done = transition_.Done(i);
-      mask_(Index(i), t) = done ? 0 : 1;
-      bootstrap |= transition_.TimeLimit(i);
-      // o2v_init_flag = released: the update is given done_t = init_{t+1}.
-      if (!Paper(switches_.o2v_init_flag)) rollout_.init[std::size_t(column) + i] = done;
+    const bool time_limit = RecordEnds(transition_, t, mask_);
+    if (!Paper(switches_.o2v_init_flag)) {  // the update is given done_t = init_{t+1}
+      for (std::size_t i = 0; i < std::size_t(N_); ++i) {
+        rollout_.init[std::size_t(column) + i] = transition_.Done(i);
+      }
     }
-    if (bootstrap && Paper(switches_.timelimit)) {
+    if (time_limit && Paper(switches_.timelimit)) {
       // V_bar(s_last, o_t) and Q_O[s_last, o], o ~ P(. | s_last, o_t); spec 1.3
       Evaluate(transition_.s_last, not_initial_, c);
       for (int i = 0; i < N_; ++i) {
@@ -403,14 +390,10 @@ double Option2Vec::Step(int stage) {
 
 void Option2Vec::RunStage(int stage) {
   means_[stage].Clear();
-  for (int epoch = 0; epoch < hyper_.epochs; ++epoch) {
-    ForEachMinibatch(order_, hyper_.minibatch, shuffle_rng_, [&](std::span<const int> rows) {
-      Batch& batch = int(rows.size()) == hyper_.minibatch ? minibatch_ : rest_;
-      Gather(rollout_, rows, batch);
-      const LossTerms terms = Loss(stage, batch, nullptr);
-      means_[stage].Add(terms, Step(stage));
-    });
-  }
+  minibatches_.Run(rollout_, hyper_, shuffle_rng_, [&](const Batch& batch) {
+    const LossTerms terms = Loss(stage, batch, nullptr);
+    means_[stage].Add(terms, Step(stage));
+  });
 }
 
 void Option2Vec::Update(std::vector<double>& stats) {
@@ -419,19 +402,13 @@ void Option2Vec::Update(std::vector<double>& stats) {
   RunStage(1 - first);
   stats.clear();
   for (const LossMeans& means : means_) means.Report(stats);
-  const double steps = double(rollout_.Size());
-  for (const double n : executed_) stats.push_back(n / steps);
-  // Mean steps of a segment; the one that the rollout's start cuts counts where it began.
-  for (std::size_t k = 0; k < executed_.size(); ++k) {
-    stats.push_back(executed_[k] / std::max(1.0, begun_[k]));
-  }
+  usage_.Report(stats);
 }
 
 std::vector<std::string> Option2Vec::StatNames() const {
   std::vector<std::string> names;
   for (const std::string& stage : Stages()) LossMeans::Names(stage, names);
-  for (Index k = 0; k < sizes_.K; ++k) names.push_back("usage_" + std::to_string(k));
-  for (Index k = 0; k < sizes_.K; ++k) names.push_back("duration_" + std::to_string(k) + "_steps");
+  usage_.Names(names);
   return names;
 }
 

@@ -1,11 +1,8 @@
 #include "algo/algorithm.h"
 #include "algo/ppo_core.h"
 #include "algo/surrogate.h"
-#include "base/check.h"
 #include "dist/diag_gaussian.h"
-#include "nn/init.h"
 #include "nn/mlp.h"
-#include "rollout/minibatch.h"
 
 namespace o2v {
 namespace {
@@ -39,16 +36,14 @@ class Ppo final : public Algorithm {
 
  private:
   struct Cache {
-    Body::Cache actor, critic;
-    Mat mu, dmu, dhidden;     // (A, B), (A, B), (h, B)
-    Mat v, dv;                // (1, B)
-    Mat dsigma;               // (A, 1)
-    Vec logp, dlogp, values;  // (B)
+    Net::Cache actor, critic;  // the actor's output is mu (A, B)
+    Mat dsigma;                // (A, 1)
+    Vec logp, dlogp, values;   // (B)
   };
 
-  void Actor(const ConstMatRef& s, Cache& c) const;   // -> c.mu; sigma is in sigma_
-  void Critic(const ConstMatRef& s, Cache& c) const;  // -> c.v
-  void MakeSigma();                                   // sigma_ = softplus(rho)
+  /// s (S, B) -> c.actor.out = mu; sigma is in sigma_.
+  void Actor(const ConstMatRef& s, Cache& c) const;
+  void MakeSigma();  // sigma_ = softplus(rho)
 
   const PpoHyper hyper_;
   const Switches switches_;
@@ -56,8 +51,7 @@ class Ppo final : public Algorithm {
   const int N_;
   Rng policy_rng_, shuffle_rng_;
 
-  Body actor_body_, critic_body_;
-  Linear actor_head_, critic_head_;
+  Net actor_, critic_net_;
   Param rho_;  // (A, 1)
   std::unique_ptr<Adam> adam_;
   std::vector<char> in_graph_;
@@ -68,14 +62,9 @@ class Ppo final : public Algorithm {
   CacheByWidth<Cache> caches_;
   Mat sigma_, a_;  // (A, 1), (A, N)
   Transition transition_;
-  std::vector<int> order_;
-  Batch minibatch_, rest_;
+  Minibatches minibatches_;
   LossMeans means_;
 };
-
-Activation ReadActivation(const Settings& s) {
-  return s.Int("activation") == 0 ? Activation::kTanh : Activation::kRelu;
-}
 
 Ppo::Ppo(const AlgorithmInput& in)
     : hyper_(*in.hyper),
@@ -84,32 +73,25 @@ Ppo::Ppo(const AlgorithmInput& in)
       N_(in.workers),
       policy_rng_(in.seed, "policy"),
       shuffle_rng_(in.seed, "shuffle"),
-      actor_head_("actor.head", in.hyper->Int("hidden", 1), in.A),
-      critic_head_("critic.v", in.hyper->Int("hidden", 1), 1),
       rho_("actor.rho", in.A, 1),
-      critic_(in.workers, hyper_.rollout) {
+      critic_(in.workers, hyper_.rollout),
+      minibatches_(Index(in.workers) * hyper_.rollout) {
   Rng init(in.seed, "init");
   const Index h = in.hyper->Int("hidden", 1);
   const Activation g = ReadActivation(*in.hyper);
-  actor_body_ = Body("actor.body", in.S, h, g, init);
-  Orthogonal(actor_head_.W.value, 1e-3, init);  // spec 2.1
-  critic_body_ = Body("critic.body", in.S, h, g, init);
-  Orthogonal(critic_head_.W.value, 1e-3, init);
+  actor_ = Net("actor.body", "actor.head", in.S, h, in.A, g, init);
+  critic_net_ = Net("critic.body", "critic.v", in.S, h, 1, g, init);
   adam_ = std::make_unique<Adam>(Params(), hyper_.adam);
   in_graph_.assign(Params().size(), 1);
 
-  const Index n = Index(N_) * hyper_.rollout;
-  rollout_.Resize(in.S, in.A, n);
+  rollout_.Resize(in.S, in.A, Index(N_) * hyper_.rollout);
   mask_ = MatD::Ones(N_, hyper_.rollout);
-  order_.resize(std::size_t(n));
 }
 
 std::vector<Param*> Ppo::Params() {
-  std::vector<Param*> params = actor_body_.Params();
-  Append(params, actor_head_.Params());
+  std::vector<Param*> params = actor_.Params();
   params.push_back(&rho_);
-  Append(params, critic_body_.Params());
-  Append(params, critic_head_.Params());
+  Append(params, critic_net_.Params());
   return params;
 }
 
@@ -126,16 +108,8 @@ void Ppo::MakeSigma() {
 }
 
 void Ppo::Actor(const ConstMatRef& s, Cache& c) const {
-  actor_body_.Forward(s, c.actor);
-  c.mu.resize(actor_head_.W.value.rows(), s.cols());
-  actor_head_.Multiply(c.actor.h1, c.mu);
-  BiasActivate(Activation::kTanh, actor_head_.b.value, c.mu);
-}
-
-void Ppo::Critic(const ConstMatRef& s, Cache& c) const {
-  critic_body_.Forward(s, c.critic);
-  c.v.resize(1, s.cols());
-  critic_head_.Forward(c.critic.h1, c.v);
+  actor_.Forward(s, c.actor);
+  Tanh(c.actor.out);
 }
 
 void Ppo::Collect(VecEnv& env, std::vector<Episode>& episodes) {
@@ -144,36 +118,31 @@ void Ppo::Collect(VecEnv& env, std::vector<Episode>& episodes) {
   for (int t = 0; t < hyper_.rollout; ++t) {
     const Index column = Index(t) * N_;
     Actor(env.States(), c);
-    SampleGaussian(c.mu, sigma_, policy_rng_, a_);
-    GaussianLogProb(a_, c.mu, sigma_, c.logp);
+    SampleGaussian(c.actor.out, sigma_, policy_rng_, a_);
+    GaussianLogProb(a_, c.actor.out, sigma_, c.logp);
     rollout_.s.middleCols(column, N_) = env.States();
     rollout_.a.middleCols(column, N_) = a_;
     rollout_.low.logp_old.segment(column, N_) = c.logp;
 
     env.Step(a_, transition_, episodes);
     critic_.r.col(t) = transition_.r;
-    bool bootstrap = false;
-    for (int i = 0; i < N_; ++i) {
-      mask_(i, t) = transition_.Done(std::size_t(i)) ? 0 : 1;
-      bootstrap |= transition_.TimeLimit(std::size_t(i));
-    }
-    if (bootstrap && switches_.timelimit == Fidelity::kPaper) {
-      Critic(transition_.s_last, c);
+    if (RecordEnds(transition_, t, mask_) && switches_.timelimit == Fidelity::kPaper) {
+      critic_net_.Forward(transition_.s_last, c.critic);
       for (int i = 0; i < N_; ++i) {
-        if (transition_.TimeLimit(std::size_t(i))) {
-          critic_.r(i, t) += hyper_.gamma * static_cast<double>(c.v(0, i));
-        }
+        if (!transition_.TimeLimit(std::size_t(i))) continue;
+        critic_.r(i, t) += hyper_.gamma * static_cast<double>(c.critic.out(0, i));
       }
     }
   }
   // The critic does not act, so its values are taken after the rollout, in blocks.
   ForEachBlock(rollout_.Size(), hyper_.minibatch, [&](Index start, Index n) {
     Cache& block = caches_(n);
-    Critic(rollout_.s.middleCols(start, n), block);
-    Eigen::Map<VecD>(critic_.v.data() + start, n) = block.v.row(0).transpose().cast<double>();
+    critic_net_.Forward(rollout_.s.middleCols(start, n), block.critic);
+    Eigen::Map<VecD>(critic_.v.data() + start, n) =
+        block.critic.out.row(0).transpose().cast<double>();
   });
-  Critic(env.States(), c);
-  critic_.v.col(hyper_.rollout) = c.v.row(0).transpose().cast<double>();
+  critic_net_.Forward(env.States(), c.critic);
+  critic_.v.col(hyper_.rollout) = c.critic.out.row(0).transpose().cast<double>();
   critic_.Finish(mask_, hyper_, switches_.adv_std_eps, rollout_.low);
 }
 
@@ -182,29 +151,24 @@ LossTerms Ppo::Loss(int, const Batch& batch, const FixedDraws*) {
   Cache& c = caches_(batch.Size());
   MakeSigma();
   Actor(batch.s, c);
-  GaussianLogProb(batch.a, c.mu, sigma_, c.logp);
+  const Mat& mu = c.actor.out;
+  GaussianLogProb(batch.a, mu, sigma_, c.logp);
   ClippedSurrogate(c.logp, batch.low.logp_old, batch.low.adv_hat, hyper_.ratio_clip, terms,
                    c.dlogp);
   terms.entropy = GaussianMeanEntropy(sigma_);
 
-  GaussianLogProbGrad(batch.a, c.mu, sigma_, c.dlogp, c.dmu, c.dsigma);
+  GaussianLogProbGrad(batch.a, mu, sigma_, c.dlogp, c.actor.dout, c.dsigma);
   AddGaussianEntropyGrad(sigma_, Real(-entropy_weight_), c.dsigma);
   SoftplusBackward(sigma_, c.dsigma);
   rho_.grad += c.dsigma;
-  ActivationBackward(Activation::kTanh, c.mu, c.dmu);
-  actor_head_.AddGrad(c.actor.h1, c.dmu);
-  c.dhidden.resize(c.actor.h1.rows(), batch.Size());
-  actor_head_.BackwardInput(c.dmu, c.dhidden);
-  actor_body_.Backward(batch.s, c.actor, c.dhidden);
+  ActivationBackward(Activation::kTanh, mu, c.actor.dout);
+  actor_.Backward(batch.s, c.actor);
 
-  Critic(batch.s, c);
-  c.values = c.v.row(0).transpose();
-  c.dv.resize(1, batch.Size());
+  critic_net_.Forward(batch.s, c.critic);
+  c.values = c.critic.out.row(0).transpose();
   ValueLoss(c.values, batch.low.ret, terms, c.dlogp);
-  c.dv.row(0) = c.dlogp.transpose();
-  critic_head_.AddGrad(c.critic.h1, c.dv);
-  critic_head_.BackwardInput(c.dv, c.dhidden);
-  critic_body_.Backward(batch.s, c.critic, c.dhidden);
+  c.critic.dout = c.dlogp.transpose();
+  critic_net_.Backward(batch.s, c.critic);
 
   terms.total = terms.surrogate - entropy_weight_ * terms.entropy + terms.value;
   return terms;
@@ -214,14 +178,10 @@ double Ppo::Step(int) { return adam_->Step(in_graph_, IdleRule::kSkip); }
 
 void Ppo::Update(std::vector<double>& stats) {
   means_.Clear();
-  for (int epoch = 0; epoch < hyper_.epochs; ++epoch) {
-    ForEachMinibatch(order_, hyper_.minibatch, shuffle_rng_, [&](std::span<const int> rows) {
-      Batch& batch = int(rows.size()) == hyper_.minibatch ? minibatch_ : rest_;
-      Gather(rollout_, rows, batch);
-      const LossTerms terms = Loss(0, batch, nullptr);
-      means_.Add(terms, Step(0));
-    });
-  }
+  minibatches_.Run(rollout_, hyper_, shuffle_rng_, [&](const Batch& batch) {
+    const LossTerms terms = Loss(0, batch, nullptr);
+    means_.Add(terms, Step(0));
+  });
   stats.clear();
   means_.Report(stats);
 }
@@ -240,14 +200,14 @@ void Ppo::ActionPolicy(const Mat& s, const std::vector<int>&, Mat& mu, Mat& sigm
   MakeSigma();
   Cache& c = caches_(s.cols());
   Actor(s, c);
-  mu = c.mu;
+  mu = c.actor.out;
   sigma = sigma_.replicate(1, s.cols());
 }
 
 void Ppo::OptionValues(const Mat& s, const std::vector<int>&, Mat& q) {
   Cache& c = caches_(s.cols());
-  Critic(s, c);
-  q = c.v;
+  critic_net_.Forward(s, c.critic);
+  q = c.critic.out;
 }
 
 }  // namespace

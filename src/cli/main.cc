@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
-#include <iomanip>
 #include <iostream>
 #include <string>
 #include <vector>
@@ -20,6 +19,7 @@
 #include "harness/config.h"
 #include "harness/evaluate.h"
 #include "harness/jobs.h"
+#include "harness/param_table.h"
 #include "harness/summary.h"
 #include "harness/trainer.h"
 
@@ -215,53 +215,15 @@ void AddForward(CLI::App& app) {
 
 // ---- params
 
-/// Parameters of the option network that the baselines share, widths h, at K options. Spec 2.3.
-int OptionNetworkSize(int S, int A, int K, int h) {
-  const int body = (S * h + h) + (h * h + h);
-  return (2 + 2 * K) * body + 2 * (h * K + K) + h * (K + 1) + (K + 1) +
-         K * ((h * A + A) + (h + 1) + A);
-}
-
-void PrintParams(bool csv) {
-  std::vector<std::vector<std::string>> lines = {
-      {"fidelity", "method", "task", "S", "A", "parameters"}};
-  Index cited = 0;  // Option2Vec, released, at the sizes of the paper's claim
-  for (const char* fidelity : {"paper", "released"}) {
-    for (const AlgorithmEntry& method : AlgorithmRegistry()) {
-      for (const EnvEntry& task : EnvRegistry()) {
-        RunRequest request;
-        request.task = task.id;
-        request.algorithm = method.id;
-        request.fidelity = fidelity;
-        const EnvSpec spec = MakeEnv(task.id, {})->Spec();
-        const Index n = CountParams(MakeRunAlgorithm(ResolveRun(request), spec)->Params());
-        if (request.fidelity == "released" && method.id == "option2vec" && spec.S == 17 &&
-            spec.A == 6) {
-          cited = n;
-        }
-        lines.push_back({fidelity, method.id, task.id, std::to_string(spec.S),
-                         std::to_string(spec.A), std::to_string(n)});
-      }
-    }
-  }
-  if (csv) {
-    for (const auto& line : lines) std::cout << CLI::detail::join(line, ",") << "\n";
-    return;
-  }
-  std::cout << AlignColumns(lines);
-  const int option_network = OptionNetworkSize(17, 6, 4, 128);  // HalfCheetah; K and h: spec 2.6
-  std::cout << "\nThe paper's 15.8 %: " << cited << " / " << option_network << " = " << std::fixed
-            << std::setprecision(1) << 100.0 * static_cast<double>(cited) / option_network
-            << " %, Option2Vec (released) against the baselines' option network with 4 options\n"
-               "of width 128, at S = 17, A = 6.\n";
-}
-
 void AddParams(CLI::App& app) {
   auto csv = std::make_shared<bool>(false);
-  CLI::App* params = app.add_subcommand("params", "number of parameters by method and task");
+  CLI::App* params = app.add_subcommand("params", "parameters by task, method and width");
   params->add_flag("--csv", *csv, "as CSV");
   params->footer("Example:\n  option2vec params --csv");
-  params->callback([csv] { PrintParams(*csv); });
+  params->callback([csv] {
+    const auto rows = ParamTable();
+    std::cout << (*csv ? ParamCsv(rows) : ParamText(rows));
+  });
 }
 
 // ---- replay

@@ -424,6 +424,7 @@ std::unique_ptr<Algorithm> MakeRunAlgorithm(const RunConfig& config, const EnvSp
   input.S = spec.S;
   input.A = spec.A;
   input.workers = config.workers;
+  input.time_limit = spec.time_limit;
   input.hyper = &config.hyper;
   input.switches = config.switches;
   input.seed = config.seed;

@@ -38,8 +38,10 @@ void BiasActivate(Activation g, const Mat& b, MatRef y) {
       for (Index i = 0; i < n; ++i) yj[i] += bias[i];
     }
   }
-  if (!relu) Flat(y) = Flat(y).tanh();
+  if (!relu) Tanh(y);
 }
+
+void Tanh(MatRef y) { Flat(y) = Flat(y).tanh(); }
 
 void ActivationBackward(Activation g, const ConstMatRef& y, MatRef dy) {
   const auto out = Flat(y);

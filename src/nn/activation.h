@@ -11,6 +11,8 @@ enum class Activation { kTanh, kRelu };
 
 /// y := g(y + b), b (n) added to every column of y (n, B), in one pass.
 void BiasActivate(Activation g, const Mat& b, MatRef y);
+/// y := tanh(y).
+void Tanh(MatRef y);
 /// dy := dy * g'(.), y = g(.) as Forward left it; both (n, B). At ReLU's kink the derivative is 0.
 void ActivationBackward(Activation g, const ConstMatRef& y, MatRef dy);
 

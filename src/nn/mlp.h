@@ -29,6 +29,36 @@ struct Body {
   /// dh1 = dL/dh1 (h, B), overwritten. Adds to the gradients; inputs need no gradient anywhere.
   void Backward(const ConstMatRef& x, Cache& cache, Mat& dh1);
 
+  /// The same with the caller's arrays, all (h, B): h0, h1 the activations, dh1 overwritten, dh0
+  /// left as the adjoint of the first layer's output.
+  void Forward(const ConstMatRef& x, MatRef h0, MatRef h1) const;
+  void Backward(const ConstMatRef& x, const ConstMatRef& h0, const ConstMatRef& h1, MatRef dh1,
+                MatRef dh0);
+
+  std::vector<Param*> Params();
+};
+
+/// A body and a linear output layer (weights orthogonal x 1e-3, bias 0). Source: spec 2.1.
+struct Net {
+  Body body;
+  Linear head;
+
+  struct Cache {
+    Body::Cache body;
+    Mat out, dout;  // (n_out, B); dout, the adjoint of out, is the input of Backward
+    Mat dhidden;    // (h, B) scratch
+  };
+
+  Net() = default;
+  Net(const std::string& body_name, const std::string& head_name, Index n_in, Index h, Index n_out,
+      Activation activation, Rng& rng);
+
+  /// x (n_in, B) -> cache.out.
+  void Forward(const ConstMatRef& x, Cache& cache) const;
+  /// From cache.dout. Adds to the gradients and leaves cache.body.dh0 for a caller whose input
+  /// learns.
+  void Backward(const ConstMatRef& x, Cache& cache);
+
   std::vector<Param*> Params();
 };
 

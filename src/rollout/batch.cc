@@ -19,7 +19,10 @@ void Batch::Resize(Index S, Index A, Index B) {
 
 void Gather(const Batch& all, std::span<const int> rows, Batch& out) {
   const Index S = all.s.rows(), A = all.a.rows();
+  const bool has_P = all.P_old.size() > 0, has_stop = !all.stop.empty();
   out.Resize(S, A, static_cast<Index>(rows.size()));
+  if (has_P) out.P_old.resize(all.P_old.rows(), out.Size());
+  if (has_stop) out.stop.resize(rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Index to = static_cast<Index>(i), from = rows[i];
     const std::size_t row = static_cast<std::size_t>(from);
@@ -36,6 +39,8 @@ void Gather(const Batch& all, std::span<const int> rows, Batch& out) {
     out.low.logp_old(to) = all.low.logp_old(from);
     out.low.adv_hat(to) = all.low.adv_hat(from);
     out.low.ret(to) = all.low.ret(from);
+    if (has_P) out.P_old.col(to) = all.P_old.col(from);
+    if (has_stop) out.stop[i] = all.stop[row];
   }
 }
 

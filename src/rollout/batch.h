@@ -23,12 +23,19 @@ struct Batch {
   std::vector<char> init;      // (B) flag the option policy is given in the update
   Stream high, low;            // single-stage methods use `low`
 
+  // Kept by the methods that need them, else empty.
+  Mat P_old;  // (K, B) probabilities that the options were drawn with: DAC, DAC-OneStep
+  std::vector<char> stop;  // (B) the previous option was stopped: AHP
+  VecD r, mask;  // (B) rewards; 0 where an episode ended: targets that the loss computes (OC, IOPG)
+  Mat s_end;     // (S, N) states after the rollout: OC
+
   Index Size() const { return s.cols(); }
-  /// Sizes all arrays for B samples.
+  /// Sizes the arrays that all methods have for B samples.
   void Resize(Index S, Index A, Index B);
 };
 
-/// Copies samples `rows` of `all` into `out`, which is resized when needed.
+/// Copies samples `rows` of `all` into `out`, which is resized when needed; P_old and stop as well
+/// where `all` has them.
 void Gather(const Batch& all, std::span<const int> rows, Batch& out);
 
 }  // namespace o2v

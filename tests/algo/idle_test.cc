@@ -11,9 +11,9 @@ enum Stage { kHigh = 0, kLow = 1 };
 
 class Idle {
  public:
-  explicit Idle(Fidelity adam_idle)
+  explicit Idle(Fidelity adam_idle, const std::string& method = "option2vec")
       : algorithm_(MakeRunAlgorithm(
-            SmallConfig("option2vec", Fidelity::kPaper, {"adam_idle=" + ToString(adam_idle)}),
+            SmallConfig(method, Fidelity::kPaper, {"adam_idle=" + ToString(adam_idle)}),
             Sizes(5, 3))),
         rng_(5, "batch"),
         flagged_(RandomBatch(5, 3, algorithm_->NumOptions(), 24, rng_)),
@@ -35,17 +35,26 @@ class Idle {
   Batch flagged_, unflagged_;
 };
 
+/// A tensor that a method's high stage alone uses.
+constexpr std::pair<const char*, const char*> kOfHighStage[] = {{"option2vec", "embed.W_o"},
+                                                                {"dac_ppo", "option2.beta.head.W"},
+                                                                {"dac_onestep", "policy.head.W"}};
+
 TEST(IdleTensors, OfTheOtherStageRestInPaper) {
-  Idle idle(Fidelity::kPaper);
-  EXPECT_TRUE(idle.Moves("embed.W_o", kHigh, true));
-  EXPECT_FALSE(idle.Moves("embed.W_o", kLow, true));
+  for (const auto& [method, tensor] : kOfHighStage) {
+    Idle idle(Fidelity::kPaper, method);
+    EXPECT_TRUE(idle.Moves(tensor, kHigh, true)) << method;
+    EXPECT_FALSE(idle.Moves(tensor, kLow, true)) << method;
+  }
 }
 
 TEST(IdleTensors, OfTheOtherStageMoveByMomentumInReleased) {
-  Idle idle(Fidelity::kReleased);
-  EXPECT_FALSE(idle.Moves("embed.W_o", kLow, true));  // never had a gradient
-  EXPECT_TRUE(idle.Moves("embed.W_o", kHigh, true));
-  EXPECT_TRUE(idle.Moves("embed.W_o", kLow, true));
+  for (const auto& [method, tensor] : kOfHighStage) {
+    Idle idle(Fidelity::kReleased, method);
+    EXPECT_FALSE(idle.Moves(tensor, kLow, true)) << method;  // never had a gradient
+    EXPECT_TRUE(idle.Moves(tensor, kHigh, true)) << method;
+    EXPECT_TRUE(idle.Moves(tensor, kLow, true)) << method;
+  }
 }
 
 TEST(IdleTensors, OfTheInitialNetBelongToTheOptionStageInPaper) {
@@ -102,16 +111,18 @@ TEST(IdleTensors, OfTheInitialNetStartTheirCountLateInReleased) {
 TEST(Minibatches, OfARemainderAreUsed) {
   // 2 workers x 9 steps = 18 samples in minibatches of 8, 8 and 2; 2 epochs.
   for (const AlgorithmEntry& method : AlgorithmRegistry()) {
+    if (!HasRatio(method.id)) continue;  // one step on everything
     const RunConfig config = SmallConfig(method.id, Fidelity::kPaper, {"rollout=9"});
     VecEnv env = PointTask(config.workers, /*time_limit=*/5);
     const auto algorithm = MakeRunAlgorithm(config, env.Spec());
     Iterate(*algorithm, env);
     StepCounts counts;
     algorithm->Visit(counts);
-    const std::vector<char> first = algorithm->InGraph(0);
-    const std::vector<char> last = algorithm->InGraph(int(algorithm->Stages().size()) - 1);
     for (std::size_t i = 0; i < counts.t.size(); ++i) {
-      const int stages = algorithm->Stages().size() == 1 ? 1 : first[i] + last[i];
+      int stages = 0;
+      for (std::size_t stage = 0; stage < algorithm->Stages().size(); ++stage) {
+        stages += algorithm->InGraph(int(stage))[i];
+      }
       EXPECT_EQ(counts.t[i], 3 * 2 * stages) << method.id << ", " << algorithm->Params()[i]->name;
     }
   }

@@ -26,6 +26,37 @@ TEST(Init, ActionsStartAtMeanZeroAndSigmaLn2) {
   }
 }
 
+TEST(Init, OptionsAreDrawnWithProbabilitiesThatSumToOne) {
+  for (const AlgorithmEntry& method : AlgorithmRegistry()) {
+    for (const Fidelity fidelity : kFidelities) {
+      const auto algorithm = MakeRunAlgorithm(SmallConfig(method.id, fidelity), Sizes(5, 3));
+      Rng rng(2, "init");
+      const Batch batch = RandomBatch(5, 3, algorithm->NumOptions(), 50, rng);
+      Mat P;
+      algorithm->OptionPolicy(batch.s, batch.o_prev, batch.init, P);
+      EXPECT_GE(P.minCoeff(), 0) << method.id;
+      EXPECT_LT((P.colwise().sum().array() - Real(1)).abs().maxCoeff(), 1e-6) << method.id;
+    }
+  }
+}
+
+TEST(Init, HalfOfThePreviousOptionsAreStopped) {
+  // beta = 1/2 and pi = 1/4 but for heads of gain 1e-3: P(o') = 1/2 + 1/2 1/4, the others 1/8.
+  for (const char* method : {"dac_ppo", "ppoc", "ahp_ppo", "iopg"}) {
+    const auto algorithm = MakeRunAlgorithm(SmallConfig(method, Fidelity::kPaper), Sizes(5, 3));
+    Rng rng(2, "init");
+    const Batch batch = RandomBatch(5, 3, 4, 50, rng);
+    Mat P, expected(4, 50);
+    algorithm->OptionPolicy(batch.s, batch.o_prev, batch.init, P);
+    for (Index b = 0; b < 50; ++b) {
+      const std::size_t i = std::size_t(b);
+      expected.col(b).setConstant(batch.init[i] ? Real(0.25) : Real(0.125));
+      if (!batch.init[i]) expected(batch.o_prev[i], b) = Real(0.625);
+    }
+    EXPECT_LT((P - expected).cwiseAbs().maxCoeff(), 0.005) << method;
+  }
+}
+
 TEST(Init, DependsOnTheSeed) {
   for (const AlgorithmEntry& method : AlgorithmRegistry()) {
     RunConfig config = SmallConfig(method.id, Fidelity::kPaper);

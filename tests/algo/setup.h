@@ -1,119 +1,60 @@
 #pragma once
-// Small methods, batches and a toy task for the tests of the methods.
+// Small methods, as the harness makes them.
 
-#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "algo/algorithm.h"
-#include "base/check.h"
+#include "algo/toy.h"
 #include "harness/config.h"
-#include "random_mat.h"
-#include "rollout/vec_env.h"
 
 namespace o2v {
 
-/// A method's own numbers, but for small networks and short rollouts, and then `set`.
-inline RunConfig SmallConfig(const std::string& method, Fidelity fidelity,
-                             const std::vector<std::string>& set = {}) {
+/// `set` ("key=value") without the numbers of rollouts that a method does not have: OC makes one
+/// step on a whole rollout, IOPG on an episode.
+inline std::vector<std::string> ForMethod(const std::string& method, std::vector<std::string> set) {
+  const bool iopg = method == "iopg", one_step = iopg || method == "oc";
+  std::erase_if(set, [&](const std::string& s) {
+    return (iopg && s.starts_with("rollout=")) ||
+           (one_step && (s.starts_with("minibatch=") || s.starts_with("epochs=")));
+  });
+  return set;
+}
+
+/// Methods that compare probabilities of an update with those of the rollout.
+inline bool HasRatio(const std::string& method) { return method != "oc" && method != "iopg"; }
+
+/// All methods, as parameters of tests.
+inline std::vector<std::string> MethodIds() {
+  std::vector<std::string> ids;
+  for (const AlgorithmEntry& method : AlgorithmRegistry()) ids.push_back(method.id);
+  return ids;
+}
+
+/// A method's own numbers for a task, one step of training, and then `set`.
+inline RunConfig ConfigFor(const std::string& task, const std::string& method, Fidelity fidelity,
+                           const std::vector<std::string>& set) {
   RunRequest request;
-  request.task = EnvRegistry().front().id;
+  request.task = task;
   request.algorithm = method;
   request.fidelity = ToString(fidelity);
   request.seed = 1;
   request.steps = 1;
-  request.set = {"workers=2", "hidden=8", "rollout=12", "minibatch=8", "epochs=2"};
-  if (method == "option2vec") {
-    request.set.insert(request.set.end(), {"embedding=6", "ffn=7", "init_hidden=16"});
-  }
-  request.set.insert(request.set.end(), set.begin(), set.end());
+  request.set = ForMethod(method, set);
   return ResolveRun(request);
 }
 
-inline EnvSpec Sizes(int S, int A) {
-  EnvSpec spec;
-  spec.S = S;
-  spec.A = A;
-  return spec;
-}
-
-/// B samples with some initial flags, ratios and advantages on all sides.
-inline Batch RandomBatch(Index S, Index A, int K, Index B, Rng& rng) {
-  Batch batch;
-  batch.Resize(S, A, B);
-  batch.s = RandomMat(S, B, rng);
-  batch.a = RandomMat(A, B, rng);
-  batch.o = RandomOptions(std::size_t(B), K, rng);
-  batch.o_prev = RandomOptions(std::size_t(B), K, rng);
-  for (std::size_t b = 0; b < std::size_t(B); ++b) batch.init[b] = b % 4 == 0;
-  for (Stream* stream : {&batch.high, &batch.low}) {
-    stream->logp_old = RandomMat(B, 1, rng, 0.2).array() - Real(2);
-    stream->adv_hat = RandomMat(B, 1, rng);
-    stream->ret = RandomMat(B, 1, rng);
+/// The same for small networks and short rollouts, and then `set`.
+inline RunConfig SmallConfig(const std::string& method, Fidelity fidelity,
+                             const std::vector<std::string>& set = {}) {
+  std::vector<std::string> all = {"workers=2", "hidden=8", "rollout=12", "minibatch=8", "epochs=2"};
+  if (method == "option2vec") {
+    all.insert(all.end(), {"embedding=6", "ffn=7", "init_hidden=16"});
   }
-  return batch;
-}
-
-inline Param& FindParam(Algorithm& algorithm, const std::string& name) {
-  for (Param* p : algorithm.Params()) {
-    if (p->name == name) return *p;
-  }
-  throw Error("no parameter " + name);
-}
-
-/// A point on a line, to be kept near 0: x <- x + 0.1 a, reward -scale |x|; starts in U(-1, 1),
-/// ends by its time limit only.
-class PointEnv final : public Env {
- public:
-  explicit PointEnv(int time_limit, double scale = 1) : scale_(scale) {
-    spec_.id = "Point";
-    spec_.S = spec_.A = 1;
-    spec_.time_limit = time_limit;
-    spec_.a_low = {-1};
-    spec_.a_high = {1};
-  }
-
-  const EnvSpec& Spec() const override { return spec_; }
-  void Reset(Rng& rng, std::span<double> obs) override {
-    obs[0] = x_ = rng.Uniform(-1, 1);
-    steps_ = 0;
-  }
-  StepResult Step(std::span<const double> a, std::span<double> obs) override {
-    obs[0] = x_ = std::clamp(x_ + 0.1 * a[0], -2.0, 2.0);
-    return {-scale_ * std::abs(x_), false, ++steps_ == spec_.time_limit};
-  }
-  void Visit(StateVisitor&, const std::string&) override {}
-
- private:
-  EnvSpec spec_;
-  double scale_, x_ = 0;
-  int steps_ = 0;
-};
-
-/// `workers` points whose first episodes have begun.
-inline VecEnv PointTask(int workers, int time_limit, double scale = 1) {
-  VecEnv env([=] { return std::make_unique<PointEnv>(time_limit, scale); }, workers, /*seed=*/3);
-  env.Reset();
-  return env;
-}
-
-/// One rollout and the update on it; the update's statistics.
-inline std::vector<double> Iterate(Algorithm& algorithm, VecEnv& env) {
-  std::vector<Episode> episodes;
-  std::vector<double> stats;
-  algorithm.Collect(env, episodes);
-  algorithm.Update(stats);
-  return stats;
-}
-
-/// The update's number of a name of StatNames().
-inline double Stat(const Algorithm& algorithm, const std::vector<double>& stats,
-                   const std::string& name) {
-  const std::vector<std::string> names = algorithm.StatNames();
-  const auto found = std::find(names.begin(), names.end(), name);
-  Check(found != names.end(), "no statistic ", name);
-  return stats[std::size_t(found - names.begin())];
+  if (method == "dac_onestep") all.push_back("ynet_hidden=16");
+  if (method == "oc") all.push_back("target_every=7");
+  all.insert(all.end(), set.begin(), set.end());
+  return ConfigFor(EnvRegistry().front().id, method, fidelity, all);
 }
 
 }  // namespace o2v

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
-#include <map>
 
 #include "algo/setup.h"
 
@@ -77,10 +77,23 @@ std::vector<double> Training(const RunConfig& config) {
 std::vector<double> TrainingOnTinyRewards(const RunConfig& config) {
   VecEnv env = PointTask(config.workers, /*time_limit=*/5, /*scale=*/1e-6);
   const auto algorithm = MakeRunAlgorithm(config, env.Spec());
-  FindParam(*algorithm, config.algorithm == "ppo" ? "critic.v.W" : "critic.q.W").value.setZero();
+  const char* head = config.algorithm == "ppo"       ? "critic.v.W"
+                     : config.algorithm == "ahp_ppo" ? "critic.u.W"
+                                                     : "critic.q.W";
+  FindParam(*algorithm, head).value.setZero();
   Iterate(*algorithm, env);
   std::vector<double> out;
   AppendValues(out, *algorithm);
+  return out;
+}
+
+/// Probabilities that options are drawn with.
+std::vector<double> OptionProbabilities(const RunConfig& config) {
+  OnBatch on(config);
+  Mat P;
+  on.algorithm->OptionPolicy(on.batch.s, on.batch.o_prev, on.batch.init, P);
+  std::vector<double> out;
+  Append(out, P);
   return out;
 }
 
@@ -98,10 +111,38 @@ std::vector<double> AntObservations(const RunConfig& config) {
   return out;
 }
 
-const std::map<std::string, Fingerprint> kFingerprints = {
+/// What a switch changes.
+struct Effect {
+  std::string name;
+  Fingerprint fingerprint;
+  std::vector<std::string> methods = {};  // empty: all that it concerns
+  std::vector<std::string> where = {};    // settings that it acts under; spec 8
+};
+
+const std::vector<Effect> kEffects = {
     {"timelimit", Training},
     {"adv_std_eps", TrainingOnTinyRewards},
     {"adam_idle", Steps},
+    {"density_log_eps", Losses},
+    {"beta_index", OptionProbabilities, {"dac_ppo", "ppoc", "oc"}},
+    {"beta_index", OptionProbabilities, {"iopg"}, {"iopg_init_flag=paper"}},
+    {"beta_index", Losses, {"dac_ppo"}},
+    {"beta_index", Losses, {"iopg"}, {"iopg_init_flag=paper"}},
+    {"beta_index", Losses, {"ppoc"}, {"ppoc_master_weight=paper"}},
+    {"dac_update_mask", Losses},
+    {"ppoc_master_weight", Losses},
+    {"oc_sampling", OptionProbabilities},
+    {"ahp_beta_index", Losses},
+    {"ahp_init_factor", Losses},
+    {"iopg_init_flag", Losses},
+    {"iopg_init_flag", OptionProbabilities},
+    {"iopg_posterior", Losses, {}, {"iopg_init_flag=paper"}},
+    {"iopg_first_sync", Training},
+    {"onestep_roles", OptionProbabilities},
+    {"onestep_roles", Losses},
+    {"onestep_norm", OptionProbabilities},
+    {"onestep_norm", Losses},
+    {"onestep_index", OptionProbabilities},
     {"o2v_option_in_update", Losses},
     {"o2v_init_flag", Training},
     {"o2v_dropout", Losses},
@@ -128,22 +169,59 @@ Switches Flipped(Switches switches, const SwitchInfo& info) {
   return switches;
 }
 
-TEST(Switches, EachChangesALossAGradientOrTheTraining) {
+bool Contains(const std::vector<std::string>& list, const std::string& x) {
+  return std::find(list.begin(), list.end(), x) != list.end();
+}
+
+TEST(Switches, EachChangesALossAGradientAnOptionOrTheTraining) {
   for (const SwitchInfo& info : SwitchRegistry()) {
-    const auto found = kFingerprints.find(info.name);
-    ASSERT_NE(found, kFingerprints.end()) << info.name << ": say in this test what it changes";
     for (const AlgorithmEntry& method : AlgorithmRegistry()) {
       if (!info.Concerns(method.id)) continue;
-      for (const Fidelity base : {Fidelity::kPaper, Fidelity::kReleased}) {
-        RunConfig config = SmallConfig(method.id, base);
-        const std::vector<double> before = found->second(config);
-        const std::string what = info.name + ", " + method.id + ", from " + ToString(base);
-        EXPECT_EQ(found->second(config), before) << what << ": not the same twice";
-        config.switches = Flipped(config.switches, info);
-        EXPECT_NE(found->second(config), before) << what << ": changes nothing";
+      bool tested = false;
+      for (const Effect& effect : kEffects) {
+        if (effect.name != info.name) continue;
+        if (!effect.methods.empty() && !Contains(effect.methods, method.id)) continue;
+        tested = true;
+        for (const Fidelity base : {Fidelity::kPaper, Fidelity::kReleased}) {
+          RunConfig config = SmallConfig(method.id, base, effect.where);
+          const std::vector<double> before = effect.fingerprint(config);
+          const std::string what = info.name + ", " + method.id + ", from " + ToString(base);
+          EXPECT_EQ(effect.fingerprint(config), before) << what << ": not the same twice";
+          config.switches = Flipped(config.switches, info);
+          EXPECT_NE(effect.fingerprint(config), before) << what << ": changes nothing";
+        }
       }
+      EXPECT_TRUE(tested) << info.name << ", " << method.id << ": say here what it changes";
     }
   }
+}
+
+/// Expects that a switch, flipped under `where`, leaves the fingerprint as it is.
+void ExpectIdle(const std::string& name, const std::string& method, const std::string& where,
+                const Fingerprint& fingerprint) {
+  for (const Fidelity base : {Fidelity::kPaper, Fidelity::kReleased}) {
+    std::vector<std::vector<double>> found;
+    for (const char* value : {"=paper", "=released"}) {
+      found.push_back(fingerprint(SmallConfig(method, base, {where, name + value})));
+    }
+    EXPECT_EQ(found[0], found[1]) << name << " under " << where << ", from " << ToString(base);
+  }
+}
+
+TEST(Switches, OfTerminationsDoNothingWhereIopgTakesEveryStepForAFirstOne) {
+  for (const char* name : {"iopg_posterior", "beta_index"}) {
+    for (const Fingerprint fingerprint : {Losses, OptionProbabilities, Training}) {
+      ExpectIdle(name, "iopg", "iopg_init_flag=released", fingerprint);
+    }
+  }
+}
+
+TEST(Switches, BetaIndexActsOnTheSamplingAloneInReleasedPpoc) {
+  ExpectIdle("beta_index", "ppoc", "ppoc_master_weight=released", Losses);
+}
+
+TEST(Switches, BetaIndexActsOnTheSamplingAloneInOc) {
+  ExpectIdle("beta_index", "oc", "oc_sampling=paper", Losses);
 }
 
 }  // namespace

@@ -104,11 +104,10 @@ TEST_F(Program, ListsNameTasksMethodsAndSwitches) {
 TEST_F(Program, ParamsPrintsThePapersRatio) {
   const std::string text = Run("params").out;
   EXPECT_NE(text.find("30598 / 193473 = 15.8 %"), std::string::npos) << text;
-  const std::string csv = Run("params --csv").out;
-  // Spec 2.2 and 2.7, S = 17, A = 6.
-  EXPECT_NE(csv.find("paper,ppo,HalfCheetah-v2,17,6,11085\n"), std::string::npos);
-  EXPECT_NE(csv.find("paper,option2vec,HalfCheetah-v2,17,6,31615\n"), std::string::npos);
-  EXPECT_NE(csv.find("released,option2vec,HalfCheetah-v2,17,6,30598\n"), std::string::npos);
+  // Spec 2.2, 2.6, 2.7, S = 17, A = 6. The rows of --csv: tests/harness/param_table_test.cc.
+  for (const char* size : {" 11085 ", " 31615 ", " 30598 "}) {
+    EXPECT_NE(text.find(size), std::string::npos) << size;
+  }
 }
 
 TEST_F(Program, TrainsIntoAFolderThatItThenRefuses) {

@@ -18,7 +18,9 @@ TEST_P(PaperConfigs, EveryRunOfTheFirstSeedMakesTwoUpdates) {
   query.results = testing::TempDir() + "/configs";
   query.seeds = {0};
   for (Job& job : ListJobs(query)) {
-    job.config.hyper.Set("rollout", 32, "test");  // steps a worker: two rollouts take no time
+    // Steps a worker: two rollouts take no time. IOPG has episodes instead.
+    const bool rollouts = job.config.hyper.Has("rollout");
+    if (rollouts) job.config.hyper.Set("rollout", 32, "test");
     const RunParts parts = PartsOf(job.config);
     VecEnv env(parts.make_env, job.config.workers, job.config.seed);
     auto algorithm = parts.make_algorithm(env.Spec());
@@ -31,6 +33,7 @@ TEST_P(PaperConfigs, EveryRunOfTheFirstSeedMakesTwoUpdates) {
       algorithm->Update(stats);
     }
     for (const double x : stats) EXPECT_TRUE(std::isfinite(x)) << job.command;
+    if (!rollouts) continue;
     EXPECT_EQ(env.TotalSteps(), 2 * 32 * job.config.workers) << job.command;
   }
 }

@@ -2,39 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include <cstddef>
-
 #include "env/task_helpers.h"
 
 #if !defined(__SANITIZE_ADDRESS__)  // which replaces them itself
-
-namespace {
-long g_allocations = 0;
-}  // namespace
-
-extern "C" {
-void* __libc_malloc(std::size_t n);
-void* __libc_calloc(std::size_t n, std::size_t size);
-void* __libc_realloc(void* p, std::size_t n);
-void* __libc_memalign(std::size_t alignment, std::size_t n);
-
-void* malloc(std::size_t n) {
-  ++g_allocations;
-  return __libc_malloc(n);
-}
-void* calloc(std::size_t n, std::size_t size) {
-  ++g_allocations;
-  return __libc_calloc(n, size);
-}
-void* realloc(void* p, std::size_t n) {
-  ++g_allocations;
-  return __libc_realloc(p, n);
-}
-void* aligned_alloc(std::size_t alignment, std::size_t n) {
-  ++g_allocations;
-  return __libc_memalign(alignment, n);
-}
-}  // extern "C"
+#include "allocation_counter.h"
 
 namespace o2v {
 namespace {

@@ -3,20 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <sstream>
-#include <tuple>
 
 #include "real_run.h"
 
 namespace o2v {
 namespace {
 
-using Case = std::tuple<const char*, const char*, const char*>;  // task, method, fidelity
-
-class Determinism : public testing::TestWithParam<Case> {};
+class Determinism : public testing::TestWithParam<RunCase> {};
 
 TEST_P(Determinism, TwoRunsWriteTheSameBytes) {
-  const auto [task, algorithm, fidelity] = GetParam();
-  RunConfig config = ShortRun(task, algorithm, fidelity, /*workers=*/2, /*iterations=*/6);
+  RunConfig config = ShortRun(GetParam(), /*iterations=*/6);
   config.eval_every = 3 * kRollout * 2;
   config.eval_episodes = 1;
   TestFolder dir;
@@ -31,18 +27,20 @@ TEST_P(Determinism, TwoRunsWriteTheSameBytes) {
   EXPECT_FALSE(ReadFile(dir / "a" / "updates.csv") == ReadFile(dir / "c" / "updates.csv"));
 }
 
-std::string Name(const testing::TestParamInfo<Case>& info) {
-  std::string name =
-      Concat(std::get<0>(info.param), '_', std::get<1>(info.param), '_', std::get<2>(info.param));
-  std::erase(name, '-');
-  return name;
+std::vector<RunCase> Cases() {
+  std::vector<RunCase> cases;
+  for (const AlgorithmEntry& method : AlgorithmRegistry()) {
+    for (const Fidelity fidelity : {Fidelity::kPaper, Fidelity::kReleased}) {
+      cases.push_back({"Hopper-v2", method.id, fidelity, /*workers=*/2});
+      const bool more = method.id == "ppo" || method.id == "option2vec";
+      if (more) cases.push_back({"Reacher-v2", method.id, fidelity, /*workers=*/2});
+    }
+  }
+  return cases;
 }
 
-INSTANTIATE_TEST_SUITE_P(Runs, Determinism,
-                         testing::Combine(testing::Values("Reacher-v2", "Hopper-v2"),
-                                          testing::Values("ppo", "option2vec"),
-                                          testing::Values("paper", "released")),
-                         Name);
+INSTANTIATE_TEST_SUITE_P(Runs, Determinism, testing::ValuesIn(Cases()),
+                         [](const auto& info) { return info.param.Name(); });
 
 }  // namespace
 }  // namespace o2v

@@ -6,13 +6,13 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <map>
 #include <string>
 #include <vector>
 
 #include "algo/algorithm.h"
 #include "base/decimal.h"
 #include "base/files.h"
+#include "small_hyper.h"
 
 namespace o2v {
 namespace {
@@ -21,37 +21,25 @@ const std::filesystem::path kFile = std::filesystem::path(O2V_TEST_DATA) / "gold
 
 using Numbers = std::vector<std::pair<std::string, double>>;
 
-/// Two rollouts of 24 steps of two workers, each with its update: the numbers of both updates and
-/// the states after them.
+/// A task whose episodes end after `time_limit` steps; 0: the task's own limit.
+std::unique_ptr<Env> MakeTask(const std::string& id, int time_limit) {
+  for (const EnvEntry& entry : EnvRegistry()) {
+    if (entry.id == id) return entry.make({}, time_limit ? time_limit : entry.time_limit);
+  }
+  throw Error("no task " + id);
+}
+
+/// Two rollouts of 24 steps of two workers, each with its update (IOPG: two episodes of at most 24
+/// steps): the numbers of both updates and the states after them.
 void Run(const std::string& task, const std::string& method, Fidelity fidelity, Numbers& out) {
-  Settings hyper;
-  const std::map<std::string, double> numbers = {{"gamma", 0.99},
-                                                 {"lambda", 0.95},
-                                                 {"rollout", 24},
-                                                 {"epochs", 2},
-                                                 {"minibatch", 16},
-                                                 {"learning_rate", 3e-4},
-                                                 {"adam_beta1", 0.9},
-                                                 {"adam_beta2", 0.999},
-                                                 {"adam_eps", 1e-5},
-                                                 {"clip_norm", 0.5},
-                                                 {"ratio_clip", 0.2},
-                                                 {"hidden", 16},
-                                                 {"entropy_weight", 0},
-                                                 {"activation", 0},
-                                                 {"options", 4},
-                                                 {"embedding", 10},
-                                                 {"heads", 1},
-                                                 {"ffn", 12},
-                                                 {"init_hidden", 16},
-                                                 {"entropy_weight_option", 0.01},
-                                                 {"entropy_weight_action", 0}};
-  for (const auto& [key, value] : numbers) hyper.Set(key, value, "golden");
-  VecEnv env([&] { return MakeEnv(task, {}); }, /*workers=*/2, /*seed=*/1);
+  const Settings hyper = SmallHyper({{"entropy_weight", method == "ppo" ? 0 : 0.01}});
+  const int time_limit = method == "iopg" ? 24 : 0;
+  VecEnv env([&] { return MakeTask(task, time_limit); }, /*workers=*/2, /*seed=*/1);
   AlgorithmInput in;
   in.S = env.Spec().S;
   in.A = env.Spec().A;
   in.workers = env.Workers();
+  in.time_limit = env.Spec().time_limit;
   in.hyper = &hyper;
   in.switches = SwitchesFor(fidelity);
   in.seed = 1;

@@ -9,7 +9,6 @@
 #include <ctime>
 #include <memory>
 #include <sstream>
-#include <tuple>
 
 #include "base/rng.h"
 #include "real_run.h"
@@ -17,11 +16,17 @@
 namespace o2v {
 namespace {
 
-constexpr int kKills = 8;     // of each kind, one after the other in the same run
 constexpr int kMaxAhead = 4;  // a kill strikes within this many iterations
-// A checkpoint follows every second iteration, so that a killed process leaves at most one new: all
-// 8 kills strike before the run is done.
-constexpr int kIterations = 2 * kKills + kMaxAhead;
+
+/// A run and how often it is killed in each way, one after the other.
+struct KilledCase {
+  RunCase run;
+  int kills;
+
+  /// A checkpoint follows every second iteration, so that a killed process leaves at most one new:
+  /// all kills strike before the run is done. IOPG's iterations are of any length: twice as many.
+  int Iterations() const { return (2 * kills + kMaxAhead) * (run.algorithm == "iopg" ? 2 : 1); }
+};
 
 enum class Moment { kRollout, kUpdate, kBeforeRename, kBeforeCheckpoint };
 constexpr std::pair<Moment, const char*> kMoments[] = {
@@ -161,19 +166,18 @@ int InChild(Action&& action) {
   return status;
 }
 
-using Case = std::tuple<const char*, const char*, int>;  // task, method, workers
+void PrintTo(const KilledCase& c, std::ostream* out) { *out << c.run.Name(); }
 
-class KilledRun : public testing::TestWithParam<Case> {};
+class KilledRun : public testing::TestWithParam<KilledCase> {};
 
 TEST_P(KilledRun, EndsInTheSameBytesWhenResumed) {
-  const auto [task, algorithm, workers] = GetParam();
-  const RunConfig config = ShortRun(task, algorithm, "paper", workers, kIterations);
+  const RunConfig config = ShortRun(GetParam().run, GetParam().Iterations());
   TestFolder dir;
   std::ostringstream progress;
   Train(config, dir / "whole", /*resume=*/false, progress, /*terminal=*/false);
   for (const auto& [moment, name] : kMoments) {
     const std::filesystem::path run = dir / name;
-    for (int kill = 0; kill < kKills; ++kill) {
+    for (int kill = 0; kill < GetParam().kills; ++kill) {
       const int status =
           InChild([&, moment = moment] { TrainUntilKilled(config, run, moment, kill); });
       ASSERT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL) << name << ", kill " << kill;
@@ -185,19 +189,29 @@ TEST_P(KilledRun, EndsInTheSameBytesWhenResumed) {
   }
 }
 
-std::string Name(const testing::TestParamInfo<Case>& info) {
-  std::string name =
-      Concat(std::get<0>(info.param), '_', std::get<1>(info.param), '_', std::get<2>(info.param));
-  std::erase(name, '-');
-  return name;
+std::vector<KilledCase> Cases() {
+  std::vector<KilledCase> cases;
+  for (const AlgorithmEntry& method : AlgorithmRegistry()) {
+    if (method.id == "ppo" || method.id == "option2vec") {
+      for (const char* task :
+           {"Ant-v2", "Humanoid-v2", "Reacher-v2", "Hopper-v2", "HalfCheetah-v2"}) {
+        for (const int workers : {1, 4}) {
+          cases.push_back({{task, method.id, Fidelity::kPaper, workers}, /*kills=*/8});
+        }
+        cases.push_back({{task, method.id, Fidelity::kReleased, /*workers=*/4}, /*kills=*/2});
+      }
+    } else {
+      for (const Fidelity fidelity : {Fidelity::kPaper, Fidelity::kReleased}) {
+        cases.push_back({{"Hopper-v2", method.id, fidelity, /*workers=*/4}, /*kills=*/5});
+        cases.push_back({{"InvertedPendulum-v2", method.id, fidelity, /*workers=*/1}, /*kills=*/5});
+      }
+    }
+  }
+  return cases;
 }
 
-INSTANTIATE_TEST_SUITE_P(Runs, KilledRun,
-                         testing::Combine(testing::Values("Ant-v2", "Humanoid-v2", "Reacher-v2",
-                                                          "Hopper-v2", "HalfCheetah-v2"),
-                                          testing::Values("ppo", "option2vec"),
-                                          testing::Values(1, 4)),
-                         Name);
+INSTANTIATE_TEST_SUITE_P(Runs, KilledRun, testing::ValuesIn(Cases()),
+                         [](const auto& info) { return info.param.run.Name(); });
 
 }  // namespace
 }  // namespace o2v

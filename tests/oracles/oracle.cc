@@ -19,7 +19,11 @@ std::string Entry(const std::string& array, Index row, Index col) {
 }
 
 const OracleMethod& FindMethod(const std::string& id) {
-  static const std::vector<OracleMethod> methods = {PpoOracle(), Option2VecOracle()};
+  static const std::vector<OracleMethod> methods = [] {
+    std::vector<OracleMethod> all = {PpoOracle(), Option2VecOracle()};
+    for (const OracleMethod& method : OptionMethodOracles()) all.push_back(method);
+    return all;
+  }();
   const auto found = std::find_if(methods.begin(), methods.end(),
                                   [&](const OracleMethod& method) { return method.id == id; });
   Check(found != methods.end(), "method '", id, "' exists, but not its comparison");
@@ -28,7 +32,7 @@ const OracleMethod& FindMethod(const std::string& id) {
 
 /// Settings under the program's names.
 std::unique_ptr<Algorithm> Make(const json& file, const OracleMethod& method, double clip_norm,
-                                Switches& switches) {
+                                Switches& switches, const json& overrides = {}) {
   const json& sizes = file.at("sizes");
   const json& given = file.at("hyper");
   Settings hyper;
@@ -42,17 +46,24 @@ std::unique_ptr<Algorithm> Make(const json& file, const OracleMethod& method, do
   set("adam_eps", given.at("adam_eps"));
   set("clip_norm", clip_norm);
   set("hidden", sizes.at("h"));
-  set("minibatch", sizes.at("B"));
-  set("rollout", 1);  // the batch is given
+  set("minibatch", 1);  // the batch is given
+  set("rollout", 1);
   set("epochs", 1);
   switches = SwitchesFor(ParseFidelity(file.at("fidelity")));
-  switches.adv_std_eps = file.at("switches").at("adv_std_eps");
+  if (file.at("switches").contains("adv_std_eps")) {
+    switches.adv_std_eps = file.at("switches").at("adv_std_eps");
+  }
   method.settings(file, hyper, switches);
+  for (const auto& [name, value] : overrides.items()) {
+    Check(name == "ppoc_master_weight" && value == 1, "variant: unknown switch ", name);
+    switches.ppoc_master_weight = Fidelity::kReleased;
+  }
   AlgorithmInput input;
   input.S = sizes.at("S");
   input.A = sizes.at("A");
   input.hyper = &hyper;
   input.switches = switches;
+  input.workers = sizes.value("N", 1);
   return MakeAlgorithm(method.id, input);
 }
 
@@ -70,6 +81,37 @@ void ForEachParam(Algorithm& algorithm, const json& arrays, Use&& use) {
   }
 }
 
+/// Loads matrices by their names in a walk over a method's state; the rest stays.
+class MatrixLoader final : public StateVisitor {
+ public:
+  using StateVisitor::Doubles;
+  using StateVisitor::Ints;
+  explicit MatrixLoader(const json& arrays, std::string prefix)
+      : arrays_(arrays), prefix_(std::move(prefix)) {}
+  void Matrix(std::string_view name, Mat& x) override {
+    for (const json& array : arrays_) {
+      if (name != prefix_ + array.at("name").get<std::string>()) continue;
+      x = OracleArray(array).cast<Real>();
+      ++loaded_;
+    }
+  }
+  void Doubles(std::string_view, double*, std::size_t) override {}
+  void Ints(std::string_view, std::int64_t*, std::size_t) override {}
+  std::size_t loaded() const { return loaded_; }
+
+ private:
+  const json& arrays_;
+  std::string prefix_;
+  std::size_t loaded_ = 0;
+};
+
+void LoadTarget(Algorithm& algorithm, const json& arrays) {
+  MatrixLoader loader(arrays, "target.");
+  algorithm.Visit(loader);
+  Check(loader.loaded() == arrays.size(), "target_params: ", loader.loaded(), " of ", arrays.size(),
+        " arrays are parameters of the target network");
+}
+
 void Load(Algorithm& algorithm, const json& arrays) {
   ForEachParam(algorithm, arrays, [](Param& p, const json& array) {
     const MatD value = OracleArray(array);
@@ -78,6 +120,12 @@ void Load(Algorithm& algorithm, const json& arrays) {
     p.value = value.cast<Real>();
   });
   ZeroGrad(algorithm.Params());
+}
+
+/// OC and IOPG compute their targets in the loss: no advantages and targets are given.
+bool OwnTargets(const json& file) {
+  const std::string method = file.at("method");
+  return method == "oc" || method == "iopg";
 }
 
 /// Stream arrays named with `suffix`; the normalisation of the given advantages is compared.
@@ -103,7 +151,7 @@ Batch ReadBatch(const json& file, const OracleMethod& method, const Algorithm& a
   if (algorithm.Stages().size() == 2) {
     ReadStream(given, "_high", switches.adv_std_eps, batch.high, out);
     ReadStream(given, "_low", switches.adv_std_eps, batch.low, out);
-  } else {
+  } else if (!OwnTargets(file)) {
     ReadStream(given, "", switches.adv_std_eps, batch.low, out);
   }
   method.batch(file, batch);
@@ -118,10 +166,17 @@ void CompareLosses(const json& file, const OracleMethod& method, Algorithm& algo
     const json& losses = file.at("losses").at(stages[i]);
     const FixedDraws draws = method.draws(file, stages[i], 0);
     const LossTerms terms = algorithm.Loss(static_cast<int>(i), batch, &draws);
-    out.Number(place + "total", terms.total, losses.at("total"));
-    out.Number(place + "surrogate", terms.surrogate, losses.at("surrogate"));
-    out.Number(place + "value", terms.value, losses.at("value"));
-    out.Number(place + "entropy", terms.entropy, losses.at("entropy"));
+    const std::pair<const char*, double> ours[] = {{"total", terms.total},
+                                                   {"surrogate", terms.surrogate},
+                                                   {"policy", terms.surrogate},
+                                                   {"value", terms.value},
+                                                   {"entropy", terms.entropy},
+                                                   {"master", terms.master},
+                                                   {"termination", terms.termination}};
+    Check(losses.contains("total") && losses.contains("value"), place, ": total or value missing");
+    for (const auto& [term, value] : ours) {
+      if (losses.contains(term)) out.Number(place + term, value, losses.at(term));
+    }
     ForEachParam(algorithm, file.at("grads").at(stages[i]), [&](const Param& p, const json& grad) {
       out.Array("grads." + stages[i] + "." + p.name, p.grad.cast<double>(), grad);
     });
@@ -274,6 +329,7 @@ Comparison CompareOracle(const json& file) {
     const double clip_norm = file.at("hyper").at("clip_norm");
     const std::unique_ptr<Algorithm> algorithm = Make(file, method, clip_norm, switches);
     Load(*algorithm, file.at("params"));
+    if (file.contains("target_params")) LoadTarget(*algorithm, file.at("target_params"));
     const Batch batch = ReadBatch(file, method, *algorithm, switches, out);
     method.forward(file, *algorithm, batch, out);
     CompareLosses(file, method, *algorithm, batch, out);
@@ -284,7 +340,15 @@ Comparison CompareOracle(const json& file) {
       Load(*unclipped, file.at("params"));
       CompareUpdates(file, method, "adam_large_clip", *unclipped, batch, large, out);
     }
-    CompareGae(file.at("gae"), out);
+    if (file.contains("variants")) {
+      for (const json& variant : file.at("variants")) {
+        const std::unique_ptr<Algorithm> other =
+            Make(file, method, clip_norm, switches, variant.at("switches"));
+        Load(*other, file.at("params"));
+        CompareLosses(variant, method, *other, batch, out);
+      }
+    }
+    if (!OwnTargets(file)) CompareGae(file.at("gae"), out);
     return out;
   } catch (const json::exception& error) {
     throw Error(error.what());

@@ -56,6 +56,8 @@ struct OracleMethod {
 
 OracleMethod PpoOracle();
 OracleMethod Option2VecOracle();
+/// DAC-OneStep, DAC+PPO, AHP+PPO, IOPG, PPOC, OC.
+std::vector<OracleMethod> OptionMethodOracles();
 
 /// An array of a file as (rows, cols). Throws Error unless it holds rows * cols numbers.
 MatD OracleArray(const nlohmann::json& array);

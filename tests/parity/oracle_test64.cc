@@ -21,7 +21,12 @@ TEST_P(Oracle, IsMatched) {
 
 INSTANTIATE_TEST_SUITE_P(Parity, Oracle,
                          testing::Values("ppo_paper", "ppo_released", "option2vec_paper",
-                                         "option2vec_released", "option2vec_released_dropout"),
+                                         "option2vec_released", "option2vec_released_dropout",
+                                         "dac_onestep_paper", "dac_onestep_released",
+                                         "dac_ppo_paper", "dac_ppo_paper_relu", "dac_ppo_released",
+                                         "dac_ppo_released_relu", "ahp_ppo_paper",
+                                         "ahp_ppo_released", "iopg_paper", "iopg_released",
+                                         "ppoc_paper", "ppoc_released", "oc_paper", "oc_released"),
                          [](const auto& info) { return info.param; });
 
 nlohmann::json Paper() { return ReadOracle(kFolder / "option2vec_paper.json"); }

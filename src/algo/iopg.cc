@@ -1,0 +1,479 @@
+#include <cmath>
+
+#include "algo/algorithm.h"
+#include "algo/option_nets.h"
+#include "algo/option_policy.h"
+#include "algo/ppo_core.h"
+#include "algo/surrogate.h"
+#include "dist/categorical.h"
+#include "dist/diag_gaussian.h"
+
+namespace o2v {
+namespace {
+
+/// IOPG: policy gradient with the options inferred from the history. With p_t[i] = pi_i(a_t | s_t)
+/// and P_t[i, j] the probability that option j follows i at s_t (call-and-return),
+///
+///   m_1 = pi(. | s_1),  c_t = sum_i m_t[i] p_t[i],  w_t[i] = m_t[i] p_t[i] / c_t,
+///   m_{t+1}[j] = sum_i w_t[i] P_{t+1}[i, j]
+///   L = -(1/L_ep) sum_t A_t ln c_t + (1/L_ep) sum_t 1/2 (R_t - v_t)^2,  A = R - v constant,
+///
+/// c_t is the probability of a_t given the history; its gradient runs through all earlier m. Each
+/// worker acts with a copy of the networks; when its episode ends, the gradient of its copy moves
+/// the master copy, which it then takes over. v is the first entry of q.
+///
+/// Switches: `iopg_init_flag` = released takes every step for a first one, so that m_t = pi(s_t)
+/// and no termination matters; `iopg_posterior` = released weighs m_t with p_t in place of p_{t-1}.
+/// Source: spec 4.5; Smith et al. 2018.
+class Iopg final : public Algorithm {
+ public:
+  explicit Iopg(const AlgorithmInput& in);
+
+  /// Steps the workers until at least one episode ends.
+  void Collect(VecEnv& env, std::vector<Episode>& episodes) override;
+  void Update(std::vector<double>& stats) override;
+  std::vector<std::string> StatNames() const override;
+  std::vector<Param*> Params() override { return nets_.Params(); }
+  void Visit(StateVisitor& v) override;
+
+  int NumOptions() const override { return int(K_); }
+  void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
+                    Mat& P) override;
+  void ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, Mat& sigma) override;
+  void OptionValues(const Mat& s, const std::vector<int>& o, Mat& q) override;
+
+  std::vector<std::string> Stages() const override { return {"all"}; }
+  /// The batch is one episode, its rewards in batch.r.
+  LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) override;
+  double Step(int stage) override;
+  std::vector<char> InGraph(int) const override { return in_graph_; }
+
+ private:
+  /// Steps that pass through the networks together; an episode's last block is padded with zeros.
+  static constexpr Index kBlock = 64;
+
+  struct Worker {
+    OptionNets nets;
+    std::vector<Param*> params;
+    Mat s, a;               // (S, n), (A, n) of the running episode, room for n steps
+    VecD r;                 // (n)
+    std::vector<int> init;  // (n) first states
+    int length = 0;         // steps so far
+    int o_prev = 0;
+  };
+
+  /// What acting at one state leaves behind.
+  struct Acting {
+    Net::Cache master, critic;
+    OptionNets::BetaCache beta;
+    OptionPolicies::Cache policy;
+    Mat log_pi, pi, M, P;  // (K, B)
+  };
+
+  /// What a block of an episode leaves behind.
+  struct Block {
+    Mat s, a;  // (S, kBlock); (A, K kBlock), the actions once for each option
+    Net::Cache master, critic;
+    OptionNets::BetaCache beta;
+    OptionPolicies::Cache policy;
+    Mat log_pi, pi;   // (K, kBlock)
+    Vec logp, dlogp;  // (K kBlock) option after option
+  };
+
+  /// Everything of an episode that the recursion reads or writes; columns are steps.
+  struct History {
+    MatD log_p, pi, beta;  // (K, n) ln p_t, pi(s_t), beta(s_t)
+    VecD v, R;             // (n)
+    MatD m, w;             // (K, n)
+    VecD log_c;            // (n)
+    MatD dlog_p, dz, db;   // (K, n) adjoints of ln p_t and of the logits of pi and beta
+    VecD dv;               // (n)
+    VecD dm, dweights;     // (K) adjoints of m_t and of the weights that pass through P_t
+    VecD dw;               // (K) adjoint that the step after leaves: of w_t, or with released
+                           // `iopg_posterior` of m_t
+    void Resize(Index K, Index n);
+  };
+
+  bool AlwaysInitial() const { return switches_.iopg_init_flag == Fidelity::kReleased; }
+  /// The distribution of the next option at s -> c.P.
+  void Options(OptionNets& nets, const ConstMatRef& s, std::span<const int> o_prev,
+               std::span<const char> init, Acting& c) const;
+  /// Loss and gradients of `nets` on an episode of n steps.
+  LossTerms EpisodeLoss(OptionNets& nets, const ConstMatRef& s, const ConstMatRef& a,
+                        std::span<const double> r, std::span<const int> init);
+  void ForwardHistory(std::span<const int> init, Index n);
+  void BackwardHistory(std::span<const int> init, Index n);
+
+  const double gamma_;
+  const Switches switches_;
+  const Index K_;
+  Rng policy_rng_;
+  OptionNets nets_;  // the master copy
+  std::vector<Param*> params_;
+  std::vector<Worker> workers_;
+  std::unique_ptr<Adam> adam_;
+  std::vector<char> in_graph_;
+
+  std::vector<int> finished_;  // workers whose episodes ended in the last step
+  CacheByWidth<Acting> acting_;
+  std::vector<std::unique_ptr<Block>> blocks_;
+  History history_;
+  Mat a_, a_one_;  // (A, N), (A, 1)
+  Transition transition_;
+  std::vector<int> o_one_;
+  std::vector<int> init_given_;
+  OptionUsage usage_;
+  LossMeans means_;
+};
+
+Iopg::Iopg(const AlgorithmInput& in)
+    : gamma_(in.hyper->Real("gamma")),
+      switches_(in.switches),
+      K_(in.hyper->Int("options", 1)),
+      policy_rng_(in.seed, "policy"),
+      workers_(std::size_t(in.workers)),
+      a_(in.A, in.workers),
+      o_one_(1),
+      usage_(K_) {
+  Rng init(in.seed, "init");
+  const auto make = [&] {
+    return OptionNets(K_, in.S, in.A, in.hyper->Int("hidden", 1), ReadActivation(*in.hyper),
+                      OptionNets::CriticHead::kQ, init);
+  };
+  nets_ = make();
+  params_ = nets_.Params();
+  // Two time limits: at a change of task the running episode goes on into the new one (spec 4.5).
+  const Index room = 2 * Index(in.time_limit);
+  for (Worker& worker : workers_) {
+    worker.nets = switches_.iopg_first_sync == Fidelity::kPaper ? nets_ : make();
+    worker.params = worker.nets.Params();
+    worker.s = Mat::Zero(in.S, room);
+    worker.a = Mat::Zero(in.A, room);
+    worker.r = VecD::Zero(room);
+    worker.init.assign(std::size_t(room), 0);
+  }
+  for (const Param* p : params_) in_graph_.push_back(!p->name.starts_with("critic.u."));
+  adam_ = std::make_unique<Adam>(params_, ReadAdam(*in.hyper));
+  finished_.reserve(workers_.size());
+  history_.Resize(K_, room);
+  init_given_.reserve(std::size_t(room));
+}
+
+void Iopg::Visit(StateVisitor& v) {
+  for (Param* p : params_) v.Matrix(p->name, p->value);
+  adam_->Visit(v);
+  policy_rng_.Visit(v, "rng.policy");
+  for (std::size_t i = 0; i < workers_.size(); ++i) {
+    Worker& worker = workers_[i];
+    const std::string name = "copy" + std::to_string(i) + ".";
+    for (Param* p : worker.params) v.Matrix(name + p->name, p->value);
+    v.Matrix(name + "s", worker.s);
+    v.Matrix(name + "a", worker.a);
+    v.Doubles(name + "r", worker.r);
+    v.Ints(name + "init", worker.init);
+    v.Int(name + "length", worker.length);
+    v.Int(name + "o_prev", worker.o_prev);
+  }
+}
+
+// ---- Acting -------------------------------------------------------------------------------------
+
+void Iopg::Options(OptionNets& nets, const ConstMatRef& s, std::span<const int> o_prev,
+                   std::span<const char> init, Acting& c) const {
+  nets.master.Forward(s, c.master);
+  LogSoftmax(c.master.out, c.log_pi, c.pi);
+  if (AlwaysInitial()) {
+    c.P = c.pi;
+    return;
+  }
+  nets.Beta(s, o_prev, switches_.beta_index == Fidelity::kReleased, c.beta);
+  c.M.resize(K_, s.cols());
+  OneHot(o_prev, c.M);
+  CallAndReturn(c.pi, c.beta.beta, c.M, o_prev, init, switches_.beta_index, c.P);
+}
+
+void Iopg::Collect(VecEnv& env, std::vector<Episode>& episodes) {
+  usage_.Clear();
+  finished_.clear();
+  Acting& c = acting_(1);
+  for (Worker& worker : workers_) worker.nets.policy.MakeSigma();
+  while (finished_.empty()) {
+    for (std::size_t i = 0; i < workers_.size(); ++i) {
+      Worker& worker = workers_[i];
+      const auto s = env.States().col(Index(i));
+      const bool init = env.Init()[i];
+      Options(worker.nets, s, {&worker.o_prev, 1}, {&env.Init()[i], 1}, c);
+      SampleCategorical(c.P, policy_rng_, o_one_);
+      worker.nets.policy.ForwardOne(s, o_one_, c.policy);
+      SampleGaussian(c.policy.nets.out, c.policy.sigma, policy_rng_, a_one_);
+      a_.col(Index(i)) = a_one_;
+      worker.s.col(worker.length) = s;
+      worker.a.col(worker.length) = a_one_;
+      worker.init[std::size_t(worker.length)] = init;
+      usage_.Count(o_one_[0], worker.o_prev, init);
+      worker.o_prev = o_one_[0];
+    }
+    env.Step(a_, transition_, episodes);
+    for (std::size_t i = 0; i < workers_.size(); ++i) {
+      Worker& worker = workers_[i];
+      double& r = worker.r(worker.length++);
+      r = transition_.r(Index(i));
+      if (!transition_.Done(i)) continue;
+      finished_.push_back(int(i));
+      if (transition_.TimeLimit(i) && switches_.timelimit == Fidelity::kPaper) {
+        worker.nets.critic.Forward(transition_.s_last.col(Index(i)), c.critic);
+        r += gamma_ * double(c.critic.out(0, 0));  // spec 1.3
+      }
+    }
+  }
+}
+
+void Iopg::Update(std::vector<double>& stats) {
+  means_.Clear();
+  for (const int i : finished_) {
+    Worker& worker = workers_[std::size_t(i)];
+    const Index n = worker.length;
+    const LossTerms terms =
+        EpisodeLoss(worker.nets, worker.s.leftCols(n), worker.a.leftCols(n),
+                    {worker.r.data(), std::size_t(n)}, {worker.init.data(), std::size_t(n)});
+    for (std::size_t j = 0; j < params_.size(); ++j) {
+      params_[j]->grad = worker.params[j]->grad;
+      worker.params[j]->grad.setZero();
+    }
+    means_.Add(terms, Step(0));
+  }
+  // After all of them: those that finished together used the same old copies.
+  for (const int i : finished_) {
+    Worker& worker = workers_[std::size_t(i)];
+    for (std::size_t j = 0; j < params_.size(); ++j) worker.params[j]->value = params_[j]->value;
+    worker.length = 0;
+  }
+  stats.clear();
+  means_.Report(stats);
+  usage_.Report(stats);
+}
+
+// ---- Loss ---------------------------------------------------------------------------------------
+
+void Iopg::History::Resize(Index K, Index n) {
+  for (VecD* x : {&dm, &dweights, &dw}) x->resize(K);
+  if (v.size() >= n) return;
+  for (MatD* x : {&log_p, &pi, &beta, &m, &w, &dlog_p, &dz, &db}) x->resize(K, n);
+  for (VecD* x : {&v, &R, &log_c, &dv}) x->resize(n);
+}
+
+/// m, w, ln c from ln p, pi and beta. In log space: w_t is a softmax of ln m_t + ln p_t.
+void Iopg::ForwardHistory(std::span<const int> init, Index n) {
+  History& h = history_;
+  const bool paper = switches_.iopg_posterior == Fidelity::kPaper;
+  const double K = double(K_);
+  for (Index t = 0; t < n; ++t) {
+    const auto pi = h.pi.col(t).array(), beta = h.beta.col(t).array(),
+               log_p = h.log_p.col(t).array();
+    auto m = h.m.col(t).array();
+    auto w = h.w.col(t).array();
+    // The weights that pass through P_t: w_{t-1}, or by the switch m_{t-1} p_t / sum, m_0 = 1/K.
+    if (!paper) {
+      if (t > 0) {
+        w = h.m.col(t - 1).array().log() + log_p;
+      } else {
+        w = log_p - std::log(K);
+      }
+      w = (w - w.maxCoeff()).exp();
+      w /= w.sum();
+    }
+    if (init[std::size_t(t)]) {
+      m = pi;
+    } else {
+      const auto before = paper ? h.w.col(t - 1).array() : h.w.col(t).array();
+      if (switches_.beta_index == Fidelity::kPaper) {
+        m = (1 - beta) * before + (beta * before).sum() * pi;
+      } else {
+        m = (1 - beta) * before + beta * pi;
+      }
+    }
+    const double top = (m.log() + log_p).maxCoeff();
+    h.log_c(t) = top + std::log((m.log() + log_p - top).exp().sum());
+    if (paper) w = (m.log() + log_p - h.log_c(t)).exp();
+  }
+}
+
+/// Adjoints of ln p, of the logits and of v, from the last step to the first; spec 4.5 (e).
+void Iopg::BackwardHistory(std::span<const int> init, Index n) {
+  History& h = history_;
+  const bool paper = switches_.iopg_posterior == Fidelity::kPaper;
+  const bool eps = switches_.density_log_eps == Fidelity::kReleased;
+  VecD &dm = h.dm, &dweights = h.dweights, &dw = h.dw;
+  dw.setZero();
+  for (Index t = n - 1; t >= 0; --t) {
+    const auto pi = h.pi.col(t).array(), beta = h.beta.col(t).array(), m = h.m.col(t).array();
+    const auto ratio = (h.log_p.col(t).array() - h.log_c(t)).exp();  // p_t / c_t
+    const double c = std::exp(h.log_c(t));
+    const double kappa =
+        -(h.R(t) - h.v(t)) / double(n) * (eps ? c / (c + kLogEps) : 1);  // of ln c_t
+    if (paper) {
+      const double mean = dw.dot(h.w.col(t));
+      dm = (kappa + dw.array() - mean) * ratio;
+    } else {
+      dm = kappa * ratio + dw.array();
+    }
+    if (paper) {
+      h.dlog_p.col(t) = m * dm.array();
+    } else {
+      h.dlog_p.col(t) = kappa * m * ratio;
+    }
+
+    // Through P_t: m = (1 - beta) w + (...) pi.
+    h.db.col(t).setZero();
+    dweights.setZero();
+    const double along = (pi * dm.array()).sum();
+    if (init[std::size_t(t)]) {
+      h.dz.col(t) = pi * (dm.array() - along);
+    } else {
+      const auto before = paper ? h.w.col(t - 1).array() : h.w.col(t).array();
+      if (switches_.beta_index == Fidelity::kPaper) {
+        h.db.col(t) = before * (along - dm.array()) * beta * (1 - beta);
+        h.dz.col(t) = (beta * before).sum() * pi * (dm.array() - along);
+        dweights = (1 - beta) * dm.array() + beta * along;
+      } else {
+        h.db.col(t) = dm.array() * (pi - before) * beta * (1 - beta);
+        h.dz.col(t) = pi * (beta * dm.array() - (beta * pi * dm.array()).sum());
+        dweights = (1 - beta) * dm.array() + (beta * pi * dm.array()).sum();
+      }
+    }
+    if (paper) {
+      dw = dweights;
+    } else {  // weights = softmax(ln m_{t-1} + ln p_t)
+      const auto weights = h.w.col(t).array();
+      const double mean = (weights * dweights.array()).sum();
+      h.dlog_p.col(t).array() += weights * (dweights.array() - mean);
+      if (t > 0) {
+        dw = weights * (dweights.array() - mean) / h.m.col(t - 1).array();
+      }
+    }
+  }
+}
+
+LossTerms Iopg::EpisodeLoss(OptionNets& nets, const ConstMatRef& s, const ConstMatRef& a,
+                            std::span<const double> r, std::span<const int> init) {
+  LossTerms terms;
+  const Index n = s.cols(), A = a.rows();
+  History& h = history_;
+  h.Resize(K_, n);
+  init_given_.assign(init.begin(), init.end());
+  init_given_[0] = 1;
+  if (AlwaysInitial()) std::fill(init_given_.begin(), init_given_.end(), 1);
+  const bool betas = !AlwaysInitial();
+  nets.policy.MakeSigma();
+
+  // Everything that the networks say.
+  for (Index start = 0, i = 0; start < n; start += kBlock, ++i) {
+    if (i == Index(blocks_.size())) blocks_.push_back(std::make_unique<Block>());
+    Block& block = *blocks_[std::size_t(i)];
+    const Index m = std::min(kBlock, n - start);
+    block.s.setZero(s.rows(), kBlock);
+    block.s.leftCols(m) = s.middleCols(start, m);
+    block.a.setZero(A, K_ * kBlock);
+    for (Index k = 0; k < K_; ++k) {
+      block.a.middleCols(k * kBlock, m) = a.middleCols(start, m);
+    }
+    nets.master.Forward(block.s, block.master);
+    LogSoftmax(block.master.out, block.log_pi, block.pi);
+    nets.critic.Forward(block.s, block.critic);
+    nets.policy.ForwardAll(block.s, block.policy);
+    GaussianLogProb(block.a, block.policy.nets.out, block.policy.sigma, block.logp);
+    if (betas) nets.Beta(block.s, {}, true, block.beta);
+    const Eigen::Map<const Mat> logp(block.logp.data(), kBlock, K_);
+    h.log_p.middleCols(start, m) = logp.topRows(m).transpose().cast<double>();
+    h.pi.middleCols(start, m) = block.pi.leftCols(m).cast<double>();
+    if (betas) {
+      h.beta.middleCols(start, m) = block.beta.beta.leftCols(m).cast<double>();
+    } else {
+      h.beta.middleCols(start, m).setOnes();
+    }
+    h.v.segment(start, m) = block.critic.out.row(0).head(m).transpose().cast<double>();
+  }
+
+  ForwardHistory(init_given_, n);
+  double R = 0;
+  for (Index t = n - 1; t >= 0; --t) {
+    R = r[std::size_t(t)] + gamma_ * R;
+    h.R(t) = R;
+    const double A_t = R - h.v(t);
+    const double log_c = switches_.density_log_eps == Fidelity::kReleased
+                             ? std::log(std::exp(h.log_c(t)) + kLogEps)
+                             : h.log_c(t);
+    terms.surrogate -= A_t * log_c / double(n);
+    terms.value += 0.5 * A_t * A_t / double(n);
+    h.dv(t) = -A_t / double(n);
+  }
+  BackwardHistory(init_given_, n);
+  terms.entropy = GaussianMeanEntropy(nets.policy.sigma());
+  terms.total = terms.surrogate + terms.value;
+
+  for (Index start = 0, i = 0; start < n; start += kBlock, ++i) {
+    Block& block = *blocks_[std::size_t(i)];
+    const Index m = std::min(kBlock, n - start);
+    block.dlogp.setZero(K_ * kBlock);
+    Eigen::Map<Mat> dlogp(block.dlogp.data(), kBlock, K_);
+    dlogp.topRows(m) = h.dlog_p.middleCols(start, m).transpose().cast<Real>();
+    GaussianLogProbGrad(block.a, block.policy.nets.out, block.policy.sigma, block.dlogp,
+                        block.policy.nets.dout, block.policy.dsigma);
+    nets.policy.Backward(block.s, {}, block.policy);
+    block.master.dout.setZero(K_, kBlock);
+    block.master.dout.leftCols(m) = h.dz.middleCols(start, m).cast<Real>();
+    nets.master.Backward(block.s, block.master);
+    block.critic.dout.setZero(K_, kBlock);
+    block.critic.dout.row(0).head(m) = h.dv.segment(start, m).transpose().cast<Real>();
+    nets.critic.Backward(block.s, block.critic);
+    if (!betas) continue;
+    block.beta.db.setZero(K_, kBlock);
+    block.beta.db.leftCols(m) = h.db.middleCols(start, m).cast<Real>();
+    nets.BackwardBeta(block.s, {}, block.beta);
+  }
+  return terms;
+}
+
+LossTerms Iopg::Loss(int, const Batch& batch, const FixedDraws*) {
+  const std::vector<int> init(batch.init.begin(), batch.init.end());
+  return EpisodeLoss(nets_, batch.s, batch.a, {batch.r.data(), std::size_t(batch.r.size())}, init);
+}
+
+double Iopg::Step(int) { return adam_->Step(in_graph_, IdleRule::kSkip); }
+
+std::vector<std::string> Iopg::StatNames() const {
+  std::vector<std::string> names;
+  LossMeans::Names("all", names);
+  usage_.Names(names);
+  return names;
+}
+
+// ---- Queries, of the master copy ----------------------------------------------------------------
+
+void Iopg::OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
+                        Mat& P) {
+  Acting& c = acting_(s.cols());
+  Options(nets_, s, o_prev, init, c);
+  P = c.P;
+  for (Index b = 0; b < P.cols(); ++b) P.col(b) /= P.col(b).sum();
+}
+
+void Iopg::ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, Mat& sigma) {
+  Acting& c = acting_(s.cols());
+  nets_.policy.MakeSigma();
+  nets_.policy.ForwardOne(s, o, c.policy);
+  mu = c.policy.nets.out;
+  sigma = c.policy.sigma;
+}
+
+void Iopg::OptionValues(const Mat& s, const std::vector<int>&, Mat& q) {
+  Acting& c = acting_(s.cols());
+  nets_.critic.Forward(s, c.critic);
+  q = c.critic.out;
+}
+
+}  // namespace
+
+std::unique_ptr<Algorithm> MakeIopg(const AlgorithmInput& in) { return std::make_unique<Iopg>(in); }
+
+}  // namespace o2v
