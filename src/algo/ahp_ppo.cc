@@ -125,6 +125,7 @@ void AhpPpo::AddLogAugmented(std::span<const char> stop, std::span<const int> o,
     const std::size_t i = std::size_t(b);
     if (Terminates(init[i])) {
       const Real beta = c.beta.beta(x[i], b);
+      // A saturated sigmoid leaves a large, finite logarithm.
       logp(b) += std::log(std::max(stop[i] ? beta : 1 - beta, std::numeric_limits<Real>::min()));
     }
     if (stop[i]) logp(b) += c.log_pi(o[i], b);

@@ -21,7 +21,7 @@ namespace o2v {
 struct AlgorithmInput {
   int S = 0, A = 0;                 // sizes of the task
   int workers = 1;                  // N
-  int time_limit = 1000;            // [steps] of the task's episodes
+  int time_limit = 1000;            // [steps] of the task's episodes; gym's usual limit
   const Settings* hyper = nullptr;  // hyper-parameters: keys of paper_configs/algo/<method>.toml
   Switches switches;
   std::uint64_t seed = 0;  // of all its random streams

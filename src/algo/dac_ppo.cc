@@ -7,10 +7,10 @@ namespace {
 /// DAC+PPO: the option policy is the call-and-return mixture of a master policy and of
 /// terminations,
 ///
-///   pi_hat(o | s, o') = (1 - beta_{o'}(s)) delta_{o o'} + beta_{o'}(s) pi(o | s),   pi at first
-///   states,
+///   pi_hat(o | s, o') = (1 - beta_{o'}(s)) delta_{o o'} + beta_{o'}(s) pi(o | s),
 ///
-/// and all else is the double actor-critic. Source: spec 2.3, 4.6; Zhang & Whiteson 2019.
+/// pi itself at first states; all else is the double actor-critic. Source: spec 2.3, 4.6; Zhang &
+/// Whiteson 2019.
 class DacPpo final : public DoubleActorCritic {
  public:
   explicit DacPpo(const AlgorithmInput& in) : DoubleActorCritic(in) {

@@ -12,10 +12,12 @@ namespace {
 /// OC: the option-critic, synchronous and n-step. Options by call-and-return with an epsilon-greedy
 /// choice e over q in place of a master policy.
 ///
-///   R_t = r_t + gamma m_t R_{t+1},  R_T = (1 - beta_o) q_o + beta_o max_k q_k of the target
-///   network A = R - q_o,  X = q_{o'} - [(1 - eps) max_k q_k + eps mean_k q_k] + eta      both
-///   constant L = -mean A ln pi_o(a | s) - w mean H(pi_o) + 1/2 mean (q_o - R)^2 + mean beta_{o'} X
-///   (1 - init)
+///   R_t = r_t + gamma m_t R_{t+1}
+///   R_T = (1 - beta_o) q_o + beta_o max_k q_k                         of the target network
+///   A = R - q_o                                                       constant
+///   X = q_{o'} - [(1 - eps) max_k q_k + eps mean_k q_k] + eta         constant
+///   L = -mean A ln pi_o(a | s) - w mean H(pi_o) + 1/2 mean (q_o - R)^2
+///       + mean beta_{o'} X (1 - init)
 ///
 /// One step of the optimiser a rollout of T steps of N workers. The master network and the head u
 /// are never used. Source: spec 4.3; Bacon et al. 2017.
@@ -42,8 +44,8 @@ class OptionCritic final : public Algorithm {
 
  private:
   struct Cache {
-    Net::Cache critic;  // out is q (K, B)
-    OptionNets::BetaCache beta;
+    Net::Cache critic;                        // out is q (K, B)
+    OptionNets::BetaCache beta, target_beta;  // of the online network; of o, of the target network
     OptionPolicies::Cache policy;
     Mat e, M, pi_hat, P;     // (K, B)
     std::vector<int> o;      // (B)
@@ -147,12 +149,11 @@ void OptionCritic::Options(const ConstMatRef& s, std::span<const int> o_prev,
 
 void OptionCritic::TargetValue(const ConstMatRef& s, std::span<const int> o, Cache& c) const {
   target_.critic.Forward(s, c.critic);
-  // of all options where Options asks for all: the cache keeps its size
-  target_.Beta(s, o, switches_.beta_index == Fidelity::kReleased, c.beta);
+  target_.Beta(s, o, false, c.target_beta);
   c.end.resize(s.cols());
   for (Index b = 0; b < s.cols(); ++b) {
     const int k = o[std::size_t(b)];
-    const double beta = c.beta.beta(k, b);
+    const double beta = c.target_beta.beta(k, b);
     c.end(b) =
         (1 - beta) * double(c.critic.out(k, b)) + beta * double(c.critic.out.col(b).maxCoeff());
   }

@@ -14,14 +14,16 @@ namespace {
 ///
 ///   option policy   P(o | s, o_{t-1}; W_o) = softmax(FFN(MHA(query(s, o_hat_{t-1}), W_o, W_o)))
 ///                   at an episode's start softmax(z_init(s))
-///   action policy   pi_a(a | s, o) = N(mu, sigma^2),  mu = tanh(.), sigma = softplus(.) of [s,
-///   o_hat] option value    Q_O[s, o] = f([s, o_hat]),   V_bar[s, o_{t-1}] = sum_o P Q_O option
-///   stage    L_o = clip-surrogate(ln P_o) - w_o mean H(P) + 1/2 mean (V_bar - R^o)^2 action stage
-///   L_a = clip-surrogate(ln pi_a) - w_a mean H(pi_a) + 1/2 mean (Q_O[s, o] - R^a)^2
+///   action policy   pi_a(a | s, o) = N(mu, sigma^2)
+///                   mu = tanh(.), sigma = softplus(.) of [s, o_hat]
+///   option value    Q_O[s, o] = f([s, o_hat]),  V_bar[s, o_{t-1}] = sum_o P Q_O
+///   option stage    L_o = clip-surrogate(ln P_o) - w_o mean H(P) + 1/2 mean (V_bar - R^o)^2
+///   action stage    L_a = clip-surrogate(ln pi_a) - w_a mean H(pi_a)
+///                         + 1/2 mean (Q_O[s, o] - R^a)^2
 ///
 /// o_hat is detached in action policy and critic: W_o learns by L_o alone, as memory of the
-/// attention and, with `o2v_prev_embed_grad` = paper, as part of the query. Source:
-/// spec 2.6, 2.7, 4.8; paper Eq. (3), (8)-(10).
+/// attention and, with `o2v_prev_embed_grad` = paper, as part of the query.
+/// Source: spec 2.6, 2.7, 4.8; paper Eq. (3), (8)-(10).
 class Option2Vec final : public Algorithm {
  public:
   explicit Option2Vec(const AlgorithmInput& in);

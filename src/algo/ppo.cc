@@ -9,8 +9,9 @@ namespace {
 
 /// PPO: proximal policy optimisation with a Gaussian actor and a separate critic.
 ///
-///   mu(s) = tanh(W_mu Body(s) + b),  sigma = softplus(rho) free of the state,  v(s) = w Body'(s) +
-///   b L = clip-surrogate(ln N(a; mu, sigma), old, A_hat) - w mean H + 1/2 mean (v - R)^2
+///   mu(s) = tanh(W_mu Body(s) + b),  sigma = softplus(rho) free of the state
+///   v(s)  = w_v Body'(s) + b_v
+///   L = clip-surrogate(ln N(a; mu, sigma), old, A_hat) - w mean H + 1/2 mean (v - R)^2
 ///
 /// Source: spec 2.2, 4.1; Schulman et al. 2017.
 class Ppo final : public Algorithm {

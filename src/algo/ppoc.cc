@@ -199,6 +199,7 @@ void Ppoc::MasterWeight(const Batch& batch, Cache& c) const {
     const Real stop = c.beta.beta(o_prev, b), pi = c.pi(o, b);
     const Real beta = AllBetas() ? c.beta_taken.beta(o, b) : stop;  // of the entry o of pi_hat
     const Real pi_hat = (1 - beta) * Real(o == o_prev) + beta * pi;
+    // Against 0 / 0 where terminations saturate.
     c.omega(b) = stop * pi / std::max(pi_hat, std::numeric_limits<Real>::min());
   }
 }

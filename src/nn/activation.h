@@ -1,6 +1,6 @@
 #pragma once
 // Elementwise functions. Each backward takes the output, so that no input is kept. Columns of the
-// arguments lie together (whole matrices or blocks of whole columns).
+// arguments lie together (whole matrices or blocks of whole columns); else they throw Error.
 
 #include "base/types.h"
 
