@@ -8,7 +8,7 @@ PRESET := $(if $(filter 1,$(SAN)),asan,release)
 O2V    := build/$(PRESET)/option2vec
 COMPILE = cmake --preset $(PRESET) > /dev/null && cmake --build --preset $(PRESET)
 
-.PHONY: help deps build test clean gradcheck parity oracles bench reproduce lint lint-tidy format golden
+.PHONY: help deps build test clean gradcheck parity theory oracles bench reproduce lint lint-tidy format golden report plots
 
 help:  ## lists the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -33,6 +33,10 @@ parity: deps  ## physics against the reference numbers; writes results/parity.cs
 	@$(COMPILE) --target parity
 	@build/$(PRESET)/tests/parity
 
+theory: deps  ## the paper's statements on small exact processes; writes results/theory.csv
+	@$(COMPILE) --target theory
+	@build/$(PRESET)/tests/theory
+
 ORACLES ?= tests/data/oracles
 oracles: deps  ## losses, gradients, updates against the numbers in ORACLES=DIR
 	@$(COMPILE) --target oracles
@@ -49,6 +53,18 @@ reproduce: deps  ## trains and tabulates SUITE=quick (FIDELITY= SEEDS= TASKS= AL
 	@$(COMPILE) --target option2vec
 	@$(O2V) jobs $(SUITE) $(LISTS) | xargs -P $(JOBS) -d '\n' -r -n 1 scripts/run_job.sh
 	@$(O2V) summary results/$(basename $(notdir $(SUITE)))
+
+# Debian's, which has Debian's packages; without caches beside the sources.
+PYTHON := /usr/bin/python3 -B
+CHOICE  = $(addprefix --experiment ,$(EXPERIMENTS))
+report: deps  ## tables, claims, figures: results/REPORT.md, report.html (EXPERIMENTS=ci: in results/ci)
+	@$(COMPILE) --target option2vec
+	@$(O2V) params --csv > results/params.csv
+	@$(O2V) list switches > results/switches.txt
+	@$(PYTHON) -m plots.report $(CHOICE) $(if $(CHOICE),--out results/$(firstword $(EXPERIMENTS)))
+
+plots: deps  ## the figures alone: plots/*.svg and *.png
+	@for script in plots/fig_*.py; do $(PYTHON) -m plots.$$(basename $$script .py) || exit; done
 
 lint: deps  ## formatting and include layering
 	@find src tests bench -name '*.cc' -o -name '*.h' | xargs clang-format --dry-run -Werror

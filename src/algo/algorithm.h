@@ -58,6 +58,10 @@ class Algorithm {
   /// Columns of updates.csv after `step`.
   virtual std::vector<std::string> StatNames() const = 0;
 
+  /// The workers have been put on another task, between two updates. Nothing is frozen or reset by
+  /// most methods. Source: spec 6.
+  virtual void ChangeTask() {}
+
   /// All trainable arrays in the order of the network; names as in the checkpoint format.
   virtual std::vector<Param*> Params() = 0;
   /// All state that a resumed run needs, the parameters included.
@@ -92,11 +96,14 @@ class Algorithm {
 struct AlgorithmEntry {
   std::string id;
   std::unique_ptr<Algorithm> (*make)(const AlgorithmInput&);
+  int revision;  // of its code, counted up by a change that moves its results
 };
 
 /// All methods, in the order of list.inc.
 const std::vector<AlgorithmEntry>& AlgorithmRegistry();
 /// Throws ConfigError for an unknown id; the message lists the nearest known ones.
+const AlgorithmEntry& FindAlgorithm(const std::string& id);
+/// FindAlgorithm(id).make(input).
 std::unique_ptr<Algorithm> MakeAlgorithm(const std::string& id, const AlgorithmInput& input);
 
 }  // namespace o2v

@@ -32,6 +32,7 @@ class Iopg final : public Algorithm {
   /// Steps the workers until at least one episode ends.
   void Collect(VecEnv& env, std::vector<Episode>& episodes) override;
   void Update(std::vector<double>& stats) override;
+  void ChangeTask() override;
   std::vector<std::string> StatNames() const override;
   std::vector<Param*> Params() override { return nets_.Params(); }
   void Visit(StateVisitor& v) override;
@@ -157,6 +158,13 @@ Iopg::Iopg(const AlgorithmInput& in)
   finished_.reserve(workers_.size());
   history_.Resize(K_, room);
   init_given_.reserve(std::size_t(room));
+}
+
+// The unfinished episodes of the old task are forgotten, or, where the new task's first step is not
+// marked, joined with the new task's steps; spec 4.5 (g).
+void Iopg::ChangeTask() {
+  if (switches_.switch_init_flag == Fidelity::kReleased) return;
+  for (Worker& worker : workers_) worker.length = 0;
 }
 
 void Iopg::Visit(StateVisitor& v) {

@@ -22,8 +22,9 @@ namespace {
 ///                         + 1/2 mean (Q_O[s, o] - R^a)^2
 ///
 /// o_hat is detached in action policy and critic: W_o learns by L_o alone, as memory of the
-/// attention and, with `o2v_prev_embed_grad` = paper, as part of the query.
-/// Source: spec 2.6, 2.7, 4.8; paper Eq. (3), (8)-(10).
+/// attention and, with `o2v_prev_embed_grad` = paper, as part of the query. After a change of task
+/// it is constant (`o2v_freeze`).
+/// Source: spec 2.6, 2.7, 4.8, 6; paper Eq. (3), (8)-(10).
 class Option2Vec final : public Algorithm {
  public:
   explicit Option2Vec(const AlgorithmInput& in);
@@ -31,6 +32,7 @@ class Option2Vec final : public Algorithm {
   void Collect(VecEnv& env, std::vector<Episode>& episodes) override;
   void Update(std::vector<double>& stats) override;
   std::vector<std::string> StatNames() const override;
+  void ChangeTask() override { Freeze(); }
   std::vector<Param*> Params() override;
   void Visit(StateVisitor& v) override;
 
@@ -57,6 +59,8 @@ class Option2Vec final : public Algorithm {
     Vec logp, dlogp, v, dv, H;       // (B)
   };
 
+  /// From now on `o2v_freeze` acts.
+  void Freeze();
   void MakeTables();
   /// Masks for a pass over B samples: drawn, or taken from `fixed`; null without dropout.
   const AttentionBlock::Masks* Dropout(Index B, const FixedDraws* fixed, Cache& c);
@@ -83,6 +87,7 @@ class Option2Vec final : public Algorithm {
   std::unique_ptr<Adam> adam_;
   std::vector<char> in_graph_[2];
   std::vector<std::size_t> init_params_;  // positions of the initial net in Params()
+  bool frozen_ = false;                   // the task has changed, and o2v_freeze acts
 
   Batch rollout_;  // T N samples
   Mat rollout_P_;  // (K, T N)
@@ -178,6 +183,21 @@ void Option2Vec::Visit(StateVisitor& v) {
   shuffle_rng_.Visit(v, "rng.shuffle");
   order_rng_.Visit(v, "rng.order");
   v.Ints("o_prev", o_prev_);
+  int frozen = frozen_;
+  v.Int("frozen", frozen);
+  if (frozen && !frozen_) Freeze();
+}
+
+void Option2Vec::Freeze() {
+  if (switches_.o2v_freeze == o2v::Freeze::kNone) return;
+  frozen_ = true;
+  const bool policy = switches_.o2v_freeze == o2v::Freeze::kPolicy;
+  const std::vector<Param*> params = Params();
+  for (std::size_t i = 0; i < options_.Params().size(); ++i) {  // the first of Params()
+    if (!policy && params[i] != &options_.W_o) continue;
+    in_graph_[kHigh][i] = 0;
+    if (switches_.o2v_freeze == o2v::Freeze::kPaper) adam_->Freeze(i);
+  }
 }
 
 void Option2Vec::MakeTables() {
@@ -331,7 +351,9 @@ LossTerms Option2Vec::OptionLoss(const Batch& batch, const FixedDraws* fixed) {
     dq.col(b) = c.dv(b) * P.col(b);
   }
   critic_.Backward(batch.s, c.o, W_o, c.all);
+  if (frozen_ && switches_.o2v_freeze == o2v::Freeze::kPolicy) return terms;  // P is detached
   options_.Backward(batch.s, batch.o_prev, masks, c.options);
+  if (frozen_) options_.W_o.grad.setZero();
   if (!Paper(switches_.adam_idle)) {
     // The initial net enters the graph with the first flagged row; spec 2.7.
     for (const std::size_t i : init_params_) in_graph_[kHigh][i] = !c.options.init_rows.empty();

@@ -27,11 +27,25 @@ SwitchInfo Number(std::string name, std::vector<std::string> methods, double Swi
   return info;
 }
 
+SwitchInfo OfTransfer(SwitchInfo info) {
+  info.transfer = true;
+  return info;
+}
+
+SwitchInfo FreezeChoice(std::string name, std::vector<std::string> methods,
+                        Freeze Switches::*member, std::string effect) {
+  SwitchInfo info{std::move(name), std::move(methods), std::move(effect)};
+  info.freeze = member;
+  return OfTransfer(info);
+}
+
 SwitchInfo Flag(std::string name, bool Switches::*member, std::string effect) {
   SwitchInfo info{std::move(name), {}, std::move(effect)};
   info.flag = member;
   return info;
 }
+
+constexpr const char* kFreezeNames[] = {"paper", "released", "policy", "none"};
 
 std::vector<std::string> Names(const std::string& method) {
   std::vector<std::string> names;
@@ -62,6 +76,8 @@ const std::vector<SwitchInfo>& SwitchRegistry() {
   using S = Switches;
   const std::vector<std::string> ppo_type = {"option2vec", "dac_onestep", "dac_ppo",
                                              "ahp_ppo",    "ppoc",        "ppo"};
+  const std::vector<std::string> options = {"option2vec", "dac_onestep", "dac_ppo", "ahp_ppo",
+                                            "iopg",       "ppoc",        "oc"};
   static const std::vector<SwitchInfo> registry = {
       Choice("timelimit", {}, &S::timelimit, "bootstrap at truncation | terminal"),
       Number("adv_std_eps", ppo_type, &S::adv_std_eps, 1e-8, 0, 0, 1,
@@ -107,6 +123,11 @@ const std::vector<SwitchInfo>& SwitchRegistry() {
       Choice("o2v_query", {"option2vec"}, &S::o2v_query, "one query token | two, state and option"),
       Choice("o2v_prev_embed_grad", {"option2vec"}, &S::o2v_prev_embed_grad,
              "gradient to the previous option's embedding | detached"),
+      FreezeChoice("o2v_freeze", {"option2vec"}, &S::o2v_freeze,
+                   "after a change of task: W_o constant | no gradient to it | policy: no gradient "
+                   "to the option policy | none"),
+      OfTransfer(Choice("switch_init_flag", options, &S::switch_init_flag,
+                        "after a change of task: first step marked as initial | not marked")),
       Flag("contact_forces", &S::contact_forces, "on fills cfrc_ext (mj_rnePostConstraint)"),
   };
   return registry;
@@ -119,6 +140,8 @@ Switches SwitchesFor(Fidelity fidelity) {
       switches.*info.choice = fidelity;
     } else if (info.number) {
       switches.*info.number = fidelity == Fidelity::kPaper ? info.paper : info.released;
+    } else if (info.freeze) {
+      switches.*info.freeze = fidelity == Fidelity::kPaper ? Freeze::kPaper : Freeze::kReleased;
     }
   }
   return switches;
@@ -138,6 +161,10 @@ void SetSwitch(Switches& switches, const std::string& method, const std::string&
   if (info->flag) {
     if (value != "off" && value != "on") throw bad;
     switches.*info->flag = value == "on";
+  } else if (info->freeze) {
+    const auto name = std::ranges::find(kFreezeNames, value);
+    if (name == std::end(kFreezeNames)) throw bad;
+    switches.*info->freeze = Freeze(name - std::begin(kFreezeNames));
   } else if (value == "paper" || value == "released") {
     const Fidelity fidelity = ParseFidelity(value);
     if (info->choice) {
@@ -159,6 +186,7 @@ void SetSwitch(Switches& switches, const std::string& method, const std::string&
 std::string SwitchValue(const Switches& switches, const SwitchInfo& info) {
   if (info.choice) return ToString(switches.*info.choice);
   if (info.flag) return switches.*info.flag ? "on" : "off";
+  if (info.freeze) return kFreezeNames[int(switches.*info.freeze)];
   char text[32];
   const auto result = std::to_chars(text, text + sizeof text, switches.*info.number);
   return std::string(text, result.ptr);
@@ -167,6 +195,7 @@ std::string SwitchValue(const Switches& switches, const SwitchInfo& info) {
 std::string SwitchRange(const SwitchInfo& info) {
   if (info.flag) return "off, on";
   if (info.choice) return "paper, released";
+  if (info.freeze) return "paper, released, policy, none";
   return Concat("paper, released, [", info.low, ", ", info.high, "]");
 }
 

@@ -13,6 +13,14 @@ enum class Fidelity { kPaper, kReleased };
 Fidelity ParseFidelity(const std::string& name);
 std::string ToString(Fidelity fidelity);
 
+/// What stays constant of Option2Vec from the second task on; spec 6.
+enum class Freeze {
+  kPaper,     // the embedding W_o
+  kReleased,  // W_o gets no gradient, but momentum still moves it where idle tensors are stepped
+  kPolicy,    // P detached: no gradient to any part of the option policy
+  kNone,
+};
+
 /// All switches of spec 8 that the methods read; each acts in one place, named there.
 struct Switches {
   Fidelity timelimit = Fidelity::kPaper;             // bootstrap at truncation | terminal
@@ -39,6 +47,8 @@ struct Switches {
   Fidelity o2v_init_relu = Fidelity::kPaper;         // linear | ReLU on the initial logits
   Fidelity o2v_query = Fidelity::kPaper;             // one token | two tokens
   Fidelity o2v_prev_embed_grad = Fidelity::kPaper;   // on | off
+  Freeze o2v_freeze = Freeze::kPaper;                // of transfer runs
+  Fidelity switch_init_flag = Fidelity::kPaper;      // init set at a change of task | not set
   bool contact_forces = false;                       // on fills cfrc_ext; off in both
 };
 
@@ -47,10 +57,12 @@ struct SwitchInfo {
   std::string name;
   std::vector<std::string> methods;  // empty: all
   std::string effect;                // what paper | released do
-  // One of the three is set.
+  // One of the four is set.
   Fidelity Switches::*choice = nullptr;  // paper | released
   double Switches::*number = nullptr;    // paper | released | a number
   bool Switches::*flag = nullptr;        // off | on; off in both fidelities
+  Freeze Switches::*freeze = nullptr;    // paper | released | policy | none
+  bool transfer = false;                 // concerns runs over more than one task only
   double paper = 0, released = 0;        // values of `number`
   double low = 0, high = 0;              // range of `number`
 
@@ -61,12 +73,13 @@ const std::vector<SwitchInfo>& SwitchRegistry();
 
 /// All switches at the setting of one fidelity.
 Switches SwitchesFor(Fidelity fidelity);
-/// Sets one switch to `paper`, `released` or, where it is numeric, a number; a flag to `off`, `on`.
+/// Sets one switch to `paper`, `released` or a further value that SwitchRange lists; a flag to
+/// `off`, `on`.
 /// Throws ConfigError for an unknown name (with the nearest known one), a bad value, or a switch
 /// that does not concern `method`.
 void SetSwitch(Switches& switches, const std::string& method, const std::string& name,
                const std::string& value);
-/// The setting as text, as SetSwitch reads it: `paper`, `released`, `off`, `on`, or the number.
+/// The setting as text, as SetSwitch reads it: a word or the number.
 std::string SwitchValue(const Switches& switches, const SwitchInfo& info);
 /// What SetSwitch takes, for people: "paper, released".
 std::string SwitchRange(const SwitchInfo& info);

@@ -14,12 +14,14 @@
 #include "base/align.h"
 #include "base/files.h"
 #include "base/stats.h"
+#include "env/pairs.h"
 #include "env/replay.h"
 #include "harness/checkpoint.h"
 #include "harness/config.h"
 #include "harness/evaluate.h"
 #include "harness/jobs.h"
 #include "harness/param_table.h"
+#include "harness/record.h"
 #include "harness/summary.h"
 #include "harness/trainer.h"
 
@@ -35,7 +37,7 @@ struct RunOptions {
   std::string config;
 
   void Add(CLI::App& app) {
-    app.add_option("--task", request.task, "task id, see `list tasks`");
+    app.add_option("--task", request.task, "task id or pair, see `list tasks`; A,B: A, then B");
     app.add_option("--algo", request.algorithm, "method id, see `list algorithms`");
     app.add_option("--fidelity", request.fidelity, "paper (default) or released");
     app.add_option("--set", request.set, "key=value: number of the method or run, or a switch")
@@ -53,6 +55,9 @@ void ListTasks() {
         {spec.id, std::to_string(spec.S), std::to_string(spec.A), std::to_string(spec.time_limit)});
   }
   std::cout << AlignColumns(lines);
+  lines = {{"pair", "first", "second"}};
+  for (const TaskPair& pair : PairRegistry()) lines.push_back({pair.name, pair.first, pair.second});
+  std::cout << "\n" << AlignColumns(lines);
 }
 
 void ListAlgorithms() {
@@ -142,11 +147,13 @@ Policy LoadPolicyFile(const std::string& checkpoint, RunRequest request) {
     agree(request.fidelity, ToString(own.fidelity));
     request.config = ConfigText{checkpoint, config->second};
   }
+  const std::optional<std::string> task = request.task;
+  if (request.config) request.task.reset();  // the file's own; --task says where to act
   const RunConfig config = ResolveRun(request);
-  const RunParts parts = PartsOf(config);
-  std::unique_ptr<Env> env = parts.make_env();
+  const EnvOptions options{.contact_forces = config.switches.contact_forces};
+  std::unique_ptr<Env> env = MakeEnv(SplitTasks(task.value_or(config.task)).back(), options);
   const EnvSpec spec = env->Spec();
-  Policy policy{std::move(env), parts.make_algorithm(spec), Normalizer(spec.S)};
+  Policy policy{std::move(env), MakeRunAlgorithm(config, spec), Normalizer(spec.S)};
   LoadPolicy(checkpoint, *policy.algorithm, policy.normalizer);
   return policy;
 }
@@ -170,7 +177,8 @@ void AddEval(CLI::App& app) {
       ->capture_default_str();
   eval->add_option("--seed", opt->seed, "of the episodes")->capture_default_str();
   eval->footer(
-      "Task, method, fidelity and --set are needed only where the file does not say them.\n"
+      "Task, method, fidelity and --set are needed only where the file does not say them. After a\n"
+      "transfer run --task chooses one of its tasks; the last one is the default.\n"
       "Options are always sampled.\n"
       "Examples:\n"
       "  option2vec eval --checkpoint runs/a/last.ckpt --task HalfCheetah-v2 --action mean\n"
@@ -257,7 +265,30 @@ void AddReplay(CLI::App& app, int& exit_code) {
   });
 }
 
-// ---- jobs, summary
+// ---- record, jobs, summary
+
+void AddRecord(CLI::App& app) {
+  auto runs = std::make_shared<std::vector<std::string>>();
+  CLI::App* record = app.add_subcommand("record", "writes the records of finished runs anew");
+  record->add_option("runs", *runs, "folders of runs")->required();
+  record->footer(
+      "`train` writes a record when a run ends; this is for runs of before a record held all that "
+      "it\nholds now.\n"
+      "Example:\n  option2vec record results/quick/paper/*/ppo/seed-000");
+  record->callback([runs] {
+    for (const std::string& run : *runs) {
+      const std::filesystem::path dir(run);
+      const auto manifest = ReadManifest(dir);
+      if (!manifest ||
+          (manifest->status != RunStatus::kDone && manifest->status != RunStatus::kDiverged)) {
+        throw ConfigError(run + ": not the folder of a finished run");
+      }
+      const std::string config = (dir / "config.toml").string();
+      WriteRecord(dir, ReadFile(dir / "manifest.json"),
+                  ParseRunConfig(ReadFile(config), config).steps);
+    }
+  });
+}
 
 void AddJobs(CLI::App& app, const std::string& program) {
   struct Options {
@@ -267,7 +298,8 @@ void AddJobs(CLI::App& app, const std::string& program) {
   auto opt = std::make_shared<Options>();
   opt->query.program = program;
   CLI::App* jobs = app.add_subcommand("jobs", "the runs of an experiment, one command a line");
-  jobs->add_option("experiment", opt->query.config, "a .toml file, or quick, ci")->required();
+  jobs->add_option("experiments", opt->query.configs, "a .toml file, or quick, single_task, ...")
+      ->required();
   jobs->add_option("--tasks", opt->query.tasks, "instead of the experiment's, A,B")->delimiter(',');
   jobs->add_option("--algos", opt->query.algorithms, "likewise")->delimiter(',');
   jobs->add_option("--fidelity", opt->query.fidelities, "likewise")->delimiter(',');
@@ -282,7 +314,8 @@ void AddJobs(CLI::App& app, const std::string& program) {
     if (!opt->seeds.empty()) opt->query.seeds = ParseSeeds(opt->seeds);
     for (const Job& job : ListJobs(opt->query)) {
       if (job.finished) {
-        std::cerr << job.dir.string() << ": " << ToString(*job.finished) << "\n";
+        std::cerr << job.dir.string() << ": " << ToString(*job.finished)
+                  << (job.old ? ", by an older revision of the method" : "") << "\n";
       } else {
         std::cout << job.command << "\n";
       }
@@ -318,6 +351,7 @@ int Main(int argc, char** argv) {
   AddForward(app);
   AddParams(app);
   AddReplay(app, exit_code);
+  AddRecord(app);
   AddJobs(app, argv[0]);
   AddSummary(app);
   auto fail = [](const std::exception& e, int code) {

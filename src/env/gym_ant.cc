@@ -16,7 +16,7 @@ class Ant final : public MujocoEnv {
       : MujocoEnv({"Ant-v2", "gym_ant", /*frame_skip=*/5, /*S=*/111}, options, time_limit) {}
 
  private:
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) const override {
+  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
     AddUniform(rng, 0.1, qpos);
     AddNormal(rng, 0.1, qvel);
   }

@@ -17,7 +17,7 @@ class Hopper final : public MujocoEnv {
       : MujocoEnv({"Hopper-v2", "gym_hopper", /*frame_skip=*/4, /*S=*/11}, options, time_limit) {}
 
  private:
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) const override {
+  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
     AddUniform(rng, 0.005, qpos);
     AddUniform(rng, 0.005, qvel);
   }

@@ -20,7 +20,7 @@ class InvertedDoublePendulum final : public MujocoEnv {
                   options, time_limit) {}
 
  private:
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) const override {
+  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
     AddUniform(rng, 0.1, qpos);
     AddNormal(rng, 0.1, qvel);
   }

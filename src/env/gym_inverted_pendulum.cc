@@ -17,7 +17,7 @@ class InvertedPendulum final : public MujocoEnv {
                   options, time_limit) {}
 
  private:
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) const override {
+  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
     AddUniform(rng, 0.01, qpos);
     AddUniform(rng, 0.01, qvel);
   }

@@ -19,7 +19,7 @@ class Reacher final : public MujocoEnv {
       : MujocoEnv({"Reacher-v2", "gym_reacher", /*frame_skip=*/2, /*S=*/11}, options, time_limit) {}
 
  private:
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) const override {
+  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
     AddUniform(rng, 0.1, qpos);
     const std::span<double> goal = qpos.last(2);
     do {

@@ -14,7 +14,7 @@ class Swimmer final : public MujocoEnv {
       : MujocoEnv({"Swimmer-v2", "gym_swimmer", /*frame_skip=*/4, /*S=*/8}, options, time_limit) {}
 
  private:
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) const override {
+  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
     AddUniform(rng, 0.1, qpos);
     AddUniform(rng, 0.1, qvel);
   }

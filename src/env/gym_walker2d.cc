@@ -15,7 +15,7 @@ class Walker2d final : public MujocoEnv {
                   time_limit) {}
 
  private:
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) const override {
+  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
     AddUniform(rng, 0.005, qpos);
     AddUniform(rng, 0.005, qvel);
   }

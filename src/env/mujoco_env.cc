@@ -121,6 +121,7 @@ void MujocoEnv::Reset(Rng& rng, std::span<double> obs) {
   const std::span<double> q(data_->qpos, qpos().size()), v(data_->qvel, qvel().size());
   std::copy_n(model_->qpos0, q.size(), q.begin());
   std::fill(v.begin(), v.end(), 0.0);
+  Clear();
   Perturb(rng, q, v);
   Begin(obs);
 }
@@ -131,25 +132,30 @@ void MujocoEnv::ResetTo(std::span<const double> q, std::span<const double> v,
         " positions and ", v.size(), " velocities, not ", qpos().size(), " and ", qvel().size());
   std::copy(q.begin(), q.end(), data_->qpos);
   std::copy(v.begin(), v.end(), data_->qvel);
+  Clear();
   Begin(obs);
 }
 
 // mj_resetData clears some MB, most of it the constraint solver's. Of all that only this reaches
 // the next step: mj_forward and mj_step compute the rest from it, and nobody sets applied forces.
-void MujocoEnv::Begin(std::span<double> obs) {
-  data_->time = 0;
+void MujocoEnv::Clear() {
   std::fill_n(data_->qacc_warmstart, model_->nv, 0.0);
   std::fill_n(data_->ctrl, model_->nu, 0.0);
   std::fill_n(data_->warning, int{mjNWARNING}, mjWarningStat{});
   steps_ = 0;
-  mj_forward(model_.get(), data_.get());
+}
+
+void MujocoEnv::Begin(std::span<double> obs) {
+  data_->time = 0;
+  Derive();
+  CheckWarnings();
   Finish(obs);
 }
 
 StepResult MujocoEnv::Step(std::span<const double> a, std::span<double> obs) {
   Check(a.size() == spec_.a_low.size(), spec_.id, ": got ", a.size(), " actions, not ", spec_.A);
   std::copy(a.begin(), a.end(), data_->ctrl);
-  for (int i = 0; i < frame_skip_; ++i) mj_step(model_.get(), data_.get());
+  Simulate();
   ++steps_;
   CheckWarnings();
   const double before = gauge_;
@@ -157,6 +163,12 @@ StepResult MujocoEnv::Step(std::span<const double> a, std::span<double> obs) {
   const Outcome outcome = Judge(before, gauge_, a);
   if (!std::isfinite(outcome.reward)) Diverged("non-finite reward");
   return {outcome.reward, outcome.terminated, steps_ >= spec_.time_limit};
+}
+
+void MujocoEnv::Derive() { mj_forward(model_.get(), data_.get()); }
+
+void MujocoEnv::Simulate() {
+  for (int i = 0; i < frame_skip_; ++i) mj_step(model_.get(), data_.get());
 }
 
 void MujocoEnv::Finish(std::span<double> obs) {
@@ -194,6 +206,8 @@ void MujocoEnv::Visit(StateVisitor& v, const std::string& prefix) {
   v.Doubles(prefix + "qacc_warmstart", data_->qacc_warmstart, qvel().size());
   v.Double(prefix + "gauge", gauge_);
   v.Int(prefix + "episode_step", steps_);
+  const std::span<double> target = Target();
+  if (!target.empty()) v.Doubles(prefix + "target", target.data(), target.size());
 }
 
 }  // namespace o2v

@@ -39,26 +39,28 @@ void AddUniform(Rng& rng, double bound, std::span<double> x);
 void AddNormal(Rng& rng, double scale, std::span<double> x);
 
 /// One simulated task. A derived class states the task's rules; stepping, time limit, divergence
-/// and resumption are here. A step is `frame_skip` calls of mj_step with no mj_forward after, so
-/// that quantities derived from the position (xpos, xipos, site_xpos, cinert, ...) are those of the
-/// last substep's start (RK4: of its last stage), as in the reference. Neither Reset nor Step
-/// allocates. Source: spec/environments.md, Common rules.
+/// and resumption are here. Neither Reset nor Step allocates. Source: spec/environments.md, Common
+/// rules.
 class MujocoEnv : public Env {
  public:
   const EnvSpec& Spec() const final { return spec_; }
   void Reset(Rng& rng, std::span<double> obs) final;
   StepResult Step(std::span<const double> a, std::span<double> obs) final;
-  void Visit(StateVisitor& v, const std::string& prefix) final;
+  void Visit(StateVisitor& v, const std::string& prefix) override;
 
   /// Starts an episode at a given qpos (nq), qvel (nv) instead of a random one.
   void ResetTo(std::span<const double> qpos, std::span<const double> qvel, std::span<double> obs);
 
   std::span<const double> qpos() const { return {data_->qpos, std::size_t(model_->nq)}; }
   std::span<const double> qvel() const { return {data_->qvel, std::size_t(model_->nv)}; }
+  /// The numbers of an episode that are in the model, not in qpos (where a target is): none, in
+  /// most tasks. Part of the saved state; Reset draws them, ResetTo takes them as they are.
+  virtual std::span<double> Target() { return {}; }
   /// File name of the model without its ending, "gym_hopper".
   const std::string& ModelName() const { return model_name_; }
   /// The simulator itself, for the tasks, replay, parity and tests.
   const mjModel& model() const { return *model_; }
+  mjModel& model() { return *model_; }
   const mjData& data() const { return *data_; }
   mjData& data() { return *data_; }
 
@@ -76,8 +78,15 @@ class MujocoEnv : public Env {
 
   MujocoEnv(const Facts& facts, const EnvOptions& options, int time_limit);
 
-  /// Adds the reset noise. Given qpos0 and zeros; draws for qpos entry after entry, then for qvel.
-  virtual void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) const = 0;
+  /// Adds the reset noise. Given qpos0 and zeros; draws for qpos entry after entry, then for qvel,
+  /// then for Target. It may let the simulator run: the episode starts after it.
+  virtual void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) = 0;
+  /// An environment step with the controls in data().ctrl: `frame_skip` calls of mj_step with no
+  /// mj_forward after, so that quantities derived from the position (xpos, xipos, site_xpos,
+  /// cinert, ...) are those of the last substep's start (RK4: of its last stage), as in gym.
+  virtual void Simulate();
+  /// Derives the rest of an episode's first state from qpos and qvel: mj_forward.
+  virtual void Derive();
   /// The one number of a state that the reward of the next step reads (a position, a distance). It
   /// is taken after a reset and after each step, when it is as stale as in the reference.
   virtual double Gauge() const { return 0; }
@@ -88,9 +97,12 @@ class MujocoEnv : public Env {
 
   /// Seconds of an environment step.
   double dt() const { return model_->opt.timestep * frame_skip_; }
-  /// Throw Error when the model has no such body, or site.
+  int frame_skip() const { return frame_skip_; }
+  /// Throw Error when the model has no such body, geom, site or sensor.
   int BodyId(const char* name) const { return Id(mjOBJ_BODY, name); }
+  int GeomId(const char* name) const { return Id(mjOBJ_GEOM, name); }
   int SiteId(const char* name) const { return Id(mjOBJ_SITE, name); }
+  int SensorId(const char* name) const { return Id(mjOBJ_SENSOR, name); }
 
   /// External torques and forces on all bodies, the world first (6, nbody); zeros unless
   /// EnvOptions::contact_forces. MuJoCo >= 2.0 fills them on demand only.
@@ -106,6 +118,7 @@ class MujocoEnv : public Env {
   static std::unique_ptr<mjModel, Delete> Load(const std::string& name);
 
   int Id(mjtObj type, const char* name) const;
+  void Clear();                        // all that an episode leaves behind but qpos and qvel
   void Begin(std::span<double> obs);   // an episode at the current qpos, qvel
   void Finish(std::span<double> obs);  // of a reset or step: contact forces, gauge, observation
   void CheckWarnings() const;

@@ -12,7 +12,13 @@
 namespace o2v {
 namespace {
 
-void CheckColumns(const MujocoEnv& env, const CsvTable& table) {
+// Numbers of an episode's target in a row of the table: those of the task, or none.
+std::size_t TargetColumns(MujocoEnv& env, const CsvTable& table) {
+  const bool none = std::ranges::count(table.columns, "target0") == 0;
+  return none ? 0 : env.Target().size();
+}
+
+void CheckColumns(MujocoEnv& env, const CsvTable& table) {
   std::vector<std::string> expected = {"step"};
   const auto add = [&](const char* name, std::size_t n) {
     for (std::size_t i = 0; i < n; ++i) expected.push_back(name + std::to_string(i));
@@ -20,6 +26,7 @@ void CheckColumns(const MujocoEnv& env, const CsvTable& table) {
   add("ctrl", env.Spec().a_low.size());
   add("qpos", env.qpos().size());
   add("qvel", env.qvel().size());
+  add("target", TargetColumns(env, table));
   for (std::size_t i = 0; i < std::min(expected.size(), table.columns.size()); ++i) {
     if (table.columns[i] != expected[i]) {
       throw ConfigError(Concat(table.path, ":1: column ", i + 1, ": expected '", expected[i],
@@ -55,18 +62,22 @@ CsvTable Replay(Env& env, const CsvTable& trajectory) {
   CheckColumns(sim, trajectory);
   CheckSteps(trajectory);
   const std::size_t nu = sim.Spec().a_low.size(), nq = sim.qpos().size(), nv = sim.qvel().size();
+  const std::span<double> target = sim.Target().first(TargetColumns(sim, trajectory));
   std::vector<double> obs(static_cast<std::size_t>(sim.Spec().S));
   CsvTable ours = trajectory;
   for (std::size_t row = 0; row < trajectory.Rows(); ++row) {
     const std::size_t width = trajectory.columns.size();
     const std::span<double> out(&ours.values[row * width], width);
+    const std::span<double> qpos = out.subspan(1 + nu, nq), qvel = out.subspan(1 + nu + nq, nv);
     if (out[0] == 0) {
-      sim.ResetTo(out.subspan(1 + nu, nq), out.last(nv), obs);
+      std::ranges::copy(out.last(target.size()), target.begin());
+      sim.ResetTo(qpos, qvel, obs);
     } else {
       sim.Step({&ours.values[(row - 1) * width + 1], nu}, obs);
     }
-    std::ranges::copy(sim.qpos(), out.subspan(1 + nu).begin());
-    std::ranges::copy(sim.qvel(), out.last(nv).begin());
+    std::ranges::copy(sim.qpos(), qpos.begin());
+    std::ranges::copy(sim.qvel(), qvel.begin());
+    std::ranges::copy(target, out.last(target.size()).begin());
   }
   return ours;
 }

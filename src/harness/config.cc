@@ -15,6 +15,7 @@
 #include "base/files.h"
 #include "base/names.h"
 #include "embedded/configs.h"
+#include "env/pairs.h"
 
 namespace o2v {
 namespace {
@@ -35,7 +36,11 @@ struct Layer {
 
 /// What conditional tables are asked about.
 struct Scope {
-  std::string fidelity, algorithm, task;
+  std::string fidelity, algorithm;
+  std::string tasks;     // registry ids, joined by commas
+  std::string task;      // the id, or the name of the pair
+  std::string suite;     // gym | dm
+  std::string transfer;  // "transfer" in a run over several tasks, else empty
 };
 
 // Numbers of [run] that --set takes; the others have their own options.
@@ -44,6 +49,7 @@ const std::vector<std::string> kRunNumbers = {"steps", "checkpoint_every", "eval
 const std::vector<std::string> kRunWords = {"task", "algorithm", "fidelity"};
 constexpr const char* kCommandLine = "command line";  // the origin of what no file gives
 const std::vector<std::string> kFidelities = {"paper", "released"};
+const std::vector<std::string> kSuites = {"gym", "dm", "transfer"};
 
 // Numbers that are written as words: a word's place in the list is its number.
 const std::map<std::string, std::vector<std::string>, std::less<>> kWords = {
@@ -62,6 +68,12 @@ std::vector<std::string> Keys(const std::map<std::string, Value, std::less<>>& t
   std::vector<std::string> keys;
   for (const auto& [key, value] : table) keys.push_back(key);
   return keys;
+}
+
+std::vector<std::string> PairNames() {
+  std::vector<std::string> names;
+  for (const TaskPair& pair : PairRegistry()) names.push_back(pair.name);
+  return names;
 }
 
 std::vector<std::string> Union(std::initializer_list<std::vector<std::string>> lists) {
@@ -115,15 +127,17 @@ Scalar ReadScalar(const ConfigText& file, std::string_view key, const toml::node
 /// The section's plain keys, then those of the tables in it that hold for `scope`.
 void Flatten(const ConfigText& file, const toml::table* section, const Scope& scope, Table& out) {
   if (!section) return;
-  const auto known = Union({kFidelities, Ids(AlgorithmRegistry()), Ids(EnvRegistry())});
+  const auto known =
+      Union({kSuites, kFidelities, Ids(AlgorithmRegistry()), Ids(EnvRegistry()), PairNames()});
   for (const auto& [key, node] : *section) {
     if (!node.is_table()) {
       out[std::string(key.str())] = ReadScalar(file, key.str(), node);
     } else if (!Contains(known, key.str())) {
-      Unknown(Origin(file, node), "fidelity, method or task", key.str(), known);
+      Unknown(Origin(file, node), "suite, fidelity, method or task", key.str(), known);
     }
   }
-  for (const std::string& name : {scope.fidelity, scope.algorithm, scope.task}) {
+  for (const std::string& name :
+       {scope.suite, scope.transfer, scope.fidelity, scope.algorithm, scope.task}) {
     Flatten(file, Section(file, *section, name), scope, out);
   }
 }
@@ -224,12 +238,18 @@ std::string ToWord(std::string_view key, const Scalar& scalar) {
 
 // ---- Runs
 
-std::vector<std::string> SwitchNames(const std::string& method) {
+std::vector<std::string> SwitchNames(const RunConfig& config) {
   std::vector<std::string> names;
   for (const SwitchInfo& info : SwitchRegistry()) {
-    if (info.Concerns(method)) names.push_back(info.name);
+    if (Concerns(info, config)) names.push_back(info.name);
   }
   return names;
+}
+RunConfig Named(const Scope& scope) {
+  RunConfig config;
+  config.task = scope.tasks;
+  config.algorithm = scope.algorithm;
+  return config;
 }
 
 /// The method's own file, whose keys are the known ones.
@@ -251,17 +271,16 @@ RunConfig Build(const Layer& layer, const Scope& scope, const Table& known_hyper
   RequireKnown(layer.hyper, Keys(known_hyper));
   auto need = [&](const char* key) { return Need(layer.run, where, key); };
 
-  RunConfig config;
-  for (const auto& [key, name] : {std::pair{"task", scope.task},
+  RunConfig config = Named(scope);
+  for (const auto& [key, name] : {std::pair{"task", scope.tasks},
                                   {"algorithm", scope.algorithm},
                                   {"fidelity", scope.fidelity}}) {
     const Scalar& scalar = need(key);
-    if (ToWord(key, scalar) != name) {
+    const std::string word = ToWord(key, scalar);
+    if ((key == std::string("task") ? JoinTasks(SplitTasks(word)) : word) != name) {
       throw ConfigError(Concat(scalar.origin, ": '", key, "' must stand directly in [run]"));
     }
   }
-  config.task = scope.task;
-  config.algorithm = scope.algorithm;
   config.fidelity = ParseFidelity(scope.fidelity);
   config.seed = static_cast<std::uint64_t>(ToInt("seed", need("seed"), 0));
   config.steps = ToInt("steps", need("steps"), 1);
@@ -271,7 +290,9 @@ RunConfig Build(const Layer& layer, const Scope& scope, const Table& known_hyper
       static_cast<int>(ToInt("eval_episodes", need("eval_episodes"), 1, kMaxInt));
 
   config.switches = SwitchesFor(config.fidelity);
+  const auto switches = SwitchNames(config);
   for (const auto& [key, scalar] : layer.switches) {
+    if (!Contains(switches, key)) Unknown(scalar.origin, "switch of this run", key, switches);
     try {
       SetSwitch(config.switches, config.algorithm, key, Text(scalar));
     } catch (const ConfigError& e) {
@@ -297,9 +318,19 @@ Scope CheckedScope(const Table& run, const std::string& where) {
     if (!Contains(known, name)) Unknown(scalar.origin, what, name, known);
     return name;
   };
-  return {.fidelity = word("fidelity", "fidelity", kFidelities),
-          .algorithm = word("algorithm", "method", Ids(AlgorithmRegistry())),
-          .task = word("task", "task", Ids(EnvRegistry()))};
+  Scope scope;
+  scope.fidelity = word("fidelity", "fidelity", kFidelities);
+  scope.algorithm = word("algorithm", "method", Ids(AlgorithmRegistry()));
+  const Scalar& task = Need(run, where, "task");
+  const std::vector<std::string> ids = SplitTasks(ToWord("task", task)), known = Ids(EnvRegistry());
+  for (const std::string& id : ids) {
+    if (!Contains(known, id)) Unknown(task.origin, "task", id, Union({known, PairNames()}));
+  }
+  scope.tasks = JoinTasks(ids);
+  scope.task = TasksName(ids);
+  scope.suite = ids[0].starts_with("dm-") ? "dm" : "gym";
+  if (ids.size() > 1) scope.transfer = "transfer";
+  return scope;
 }
 
 /// `text` of the command line: a whole number, a number, or else a word.
@@ -316,14 +347,14 @@ Scalar FromText(const std::string& text, std::string origin) {
   return {text, std::move(origin)};
 }
 
-void ApplySet(const std::string& assignment, const std::string& method, const Table& known_hyper,
-              Layer& layer) {
+void ApplySet(const std::string& assignment, const std::vector<std::string>& switches,
+              const Table& known_hyper, Layer& layer) {
   const std::string origin = "--set " + assignment;
   const std::size_t eq = assignment.find('=');
   if (eq == std::string::npos) throw ConfigError(origin + ": expected key=value");
   const std::string key = assignment.substr(0, eq);
   const Scalar scalar = FromText(assignment.substr(eq + 1), origin);
-  const auto switches = SwitchNames(method), hyper = Keys(known_hyper);
+  const auto hyper = Keys(known_hyper);
   if (Contains(switches, key)) {
     layer.switches[key] = scalar;
   } else if (Contains(hyper, key)) {
@@ -336,6 +367,10 @@ void ApplySet(const std::string& assignment, const std::string& method, const Ta
 }
 
 }  // namespace
+
+bool Concerns(const SwitchInfo& info, const RunConfig& config) {
+  return info.Concerns(config.algorithm) && (!info.transfer || SplitTasks(config.task).size() > 1);
+}
 
 ConfigText OpenConfig(const std::string& config) {
   constexpr std::string_view kSuffix = ".toml";
@@ -380,7 +415,7 @@ RunConfig ResolveRun(const RunRequest& request) {
   if (request.config) Put(ReadLayer(files[1], scope), layer);
   Put(options, layer.run);
   for (const std::string& assignment : request.set) {
-    ApplySet(assignment, scope.algorithm, method.hyper, layer);
+    ApplySet(assignment, SwitchNames(Named(scope)), method.hyper, layer);
   }
   return Build(layer, scope, method.hyper, kCommandLine);
 }
@@ -392,7 +427,7 @@ std::string ToToml(const RunConfig& config) {
       "\ncheckpoint_every = ", config.checkpoint_every, "\neval_every = ", config.eval_every,
       "\neval_episodes = ", config.eval_episodes, "\n\n[switches]\n");
   for (const SwitchInfo& info : SwitchRegistry()) {
-    if (!info.Concerns(config.algorithm)) continue;
+    if (!Concerns(info, config)) continue;
     text += Concat(info.name, " = ",
                    info.number ? Number(config.switches.*info.number)
                                : InQuotes(SwitchValue(config.switches, info)),
@@ -413,7 +448,7 @@ RunConfig ParseRunConfig(const std::string& text, const std::string& file_name) 
   const ConfigText file{file_name, text};
   const Scope scope = CheckedScope(ReadLayer(file, {}).run, file_name);
   const Layer layer = ReadLayer(file, scope);
-  for (const std::string& name : SwitchNames(scope.algorithm)) {
+  for (const std::string& name : SwitchNames(Named(scope))) {
     Need(layer.switches, file_name, name);
   }
   return Build(layer, scope, MethodLayer(scope).hyper, file_name);
@@ -455,6 +490,7 @@ Experiment ReadExperiment(const ConfigText& file) {
     }
     for (const toml::node& item : *list) take(ReadScalar(file, key, item));
   };
+  const auto tasks = Union({Ids(EnvRegistry()), PairNames()});
   auto read_words = [&](const char* key, std::vector<std::string>& out,
                         const std::vector<std::string>& ids) {
     read(key, [&](const Scalar& scalar) {
@@ -464,7 +500,7 @@ Experiment ReadExperiment(const ConfigText& file) {
   };
   Experiment experiment;
   experiment.name = std::filesystem::path(file.name).stem();
-  read_words("tasks", experiment.tasks, Ids(EnvRegistry()));
+  read_words("tasks", experiment.tasks, tasks);
   read_words("algorithms", experiment.algorithms, Ids(AlgorithmRegistry()));
   read_words("fidelities", experiment.fidelities, kFidelities);
   read("seeds", [&](const Scalar& scalar) {

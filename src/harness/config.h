@@ -16,7 +16,7 @@ namespace o2v {
 
 /// A fully resolved run.
 struct RunConfig {
-  std::string task, algorithm;  // registry ids
+  std::string task, algorithm;  // registry ids; several tasks joined by commas
   Fidelity fidelity = Fidelity::kPaper;
   std::uint64_t seed = 0;             // at most 2^63 - 1
   std::int64_t steps = 0;             // [environment steps] of all workers
@@ -45,6 +45,9 @@ struct RunRequest {
   std::optional<ConfigText> config;
   std::vector<std::string> set;  // "key=value": a method's number, a switch, or a number of [run]
 };
+
+/// Whether the run's method reads the switch; those of transfer only in a run over several tasks.
+bool Concerns(const SwitchInfo& info, const RunConfig& config);
 
 /// Layers, later ones win: run.toml, algo/<method>.toml, `config`, the request, its `set`. Throws
 /// ConfigError naming file, line and key for an unknown, missing or mistyped key.

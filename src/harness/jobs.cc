@@ -6,6 +6,7 @@
 
 #include "base/check.h"
 #include "base/files.h"
+#include "harness/record.h"
 
 namespace o2v {
 namespace {
@@ -28,54 +29,64 @@ std::string SeedFolder(std::uint64_t seed) {
   return "seed-" + std::string(kDigits - std::min(kDigits, digits.size()), '0') + digits;
 }
 
-/// The status of a finished run, nothing for one that is still to do.
-std::optional<RunStatus> Finished(const fs::path& dir, const RunConfig& config) {
-  const auto manifest = ReadManifest(dir);
-  if (!manifest) return std::nullopt;
-  if (manifest->status != RunStatus::kDone && manifest->status != RunStatus::kDiverged) {
-    return std::nullopt;
+/// Marks a run that is finished, by its record: the folder may be on another machine.
+void MarkFinished(Job& job) {
+  const fs::path record = RecordPath(job.dir, ".json");
+  if (!fs::exists(record)) return;
+  const Record run = ReadRecord(record);
+  if (run.config != ToToml(job.config)) {
+    throw ConfigError(Concat(record.string(), ": this run was finished with another ",
+                             "configuration; move it away to run it again"));
   }
-  if (ReadFile(dir / "config.toml") != ToToml(config)) {
-    throw ConfigError(Concat(dir.string(), ": this run was finished with another configuration; ",
-                             "move it away to run it again"));
-  }
-  return manifest->status;
+  job.finished = run.status;
+  job.old = run.revision < FindAlgorithm(job.config.algorithm).revision;
 }
 
 }  // namespace
 
 std::vector<Job> ListJobs(const JobQuery& query) {
-  const ConfigText file = OpenConfig(query.config);
-  Experiment experiment = ReadExperiment(file);
-  if (!query.tasks.empty()) experiment.tasks = query.tasks;
-  if (!query.algorithms.empty()) experiment.algorithms = query.algorithms;
-  if (!query.fidelities.empty()) experiment.fidelities = query.fidelities;
-  if (!query.seeds.empty()) experiment.seeds = query.seeds;
+  std::vector<ConfigText> files;
+  std::vector<Experiment> experiments;
+  std::size_t most_seeds = 0;
+  for (const std::string& config : query.configs) {
+    files.push_back(OpenConfig(config));
+    Experiment experiment = ReadExperiment(files.back());
+    if (!query.tasks.empty()) experiment.tasks = query.tasks;
+    if (!query.algorithms.empty()) experiment.algorithms = query.algorithms;
+    if (!query.fidelities.empty()) experiment.fidelities = query.fidelities;
+    if (!query.seeds.empty()) experiment.seeds = query.seeds;
+    most_seeds = std::max(most_seeds, experiment.seeds.size());
+    experiments.push_back(std::move(experiment));
+  }
 
   std::vector<Job> jobs;
-  auto add = [&](const std::string& fidelity, const std::string& task, const std::string& algorithm,
-                 std::uint64_t seed) {
+  auto add = [&](std::size_t e, const std::string& fidelity, const std::string& task,
+                 const std::string& algorithm, std::uint64_t seed) {
     RunRequest request;
-    request.config = file;
+    request.config = files[e];
     request.fidelity = fidelity;
     request.task = task;
     request.algorithm = algorithm;
     request.seed = static_cast<std::int64_t>(seed);
     Job job;
     job.config = ResolveRun(request);
-    job.dir = query.results / experiment.name / fidelity / task / algorithm / SeedFolder(seed);
+    job.dir = query.results / experiments[e].name / fidelity / task / algorithm / SeedFolder(seed);
     job.command =
-        Concat(Quoted(query.program), " train --config ", Quoted(query.config), " --task ", task,
-               " --algo ", algorithm, " --fidelity ", fidelity, " --seed ", seed, " --steps ",
+        Concat(Quoted(query.program), " train --config ", Quoted(query.configs[e]), " --task ",
+               task, " --algo ", algorithm, " --fidelity ", fidelity, " --seed ", seed, " --steps ",
                job.config.steps, " --out ", Quoted(job.dir.string()), " --resume");
-    job.finished = Finished(job.dir, job.config);
+    MarkFinished(job);
     jobs.push_back(std::move(job));
   };
-  for (const std::uint64_t seed : experiment.seeds) {
-    for (const std::string& fidelity : experiment.fidelities) {
-      for (const std::string& task : experiment.tasks) {
-        for (const std::string& algorithm : experiment.algorithms) {
-          add(fidelity, task, algorithm, seed);
+  for (std::size_t i = 0; i < most_seeds; ++i) {
+    for (std::size_t e = 0; e < experiments.size(); ++e) {
+      const Experiment& x = experiments[e];
+      if (i >= x.seeds.size()) continue;
+      for (const std::string& fidelity : x.fidelities) {
+        for (const std::string& task : x.tasks) {
+          for (const std::string& algorithm : x.algorithms) {
+            add(e, fidelity, task, algorithm, x.seeds[i]);
+          }
         }
       }
     }

@@ -17,13 +17,6 @@ using nlohmann::ordered_json;
 
 constexpr std::array<const char*, 4> kStatusNames = {"running", "done", "diverged", "stopped"};
 
-RunStatus ParseStatus(const std::string& name) {
-  for (std::size_t i = 0; i < kStatusNames.size(); ++i) {
-    if (name == kStatusNames[i]) return static_cast<RunStatus>(i);
-  }
-  throw Error("unknown status '" + name + "'");
-}
-
 /// "model name" of the first processor.
 std::string CpuModel() {
   std::ifstream info("/proc/cpuinfo");
@@ -48,16 +41,28 @@ void AddBuild(ordered_json& out) {
 
 std::string ToString(RunStatus status) { return kStatusNames[static_cast<std::size_t>(status)]; }
 
-void WriteManifest(const std::filesystem::path& dir, const Manifest& manifest) {
+RunStatus ParseStatus(const std::string& name) {
+  for (std::size_t i = 0; i < kStatusNames.size(); ++i) {
+    if (name == kStatusNames[i]) return static_cast<RunStatus>(i);
+  }
+  throw Error("unknown status '" + name + "'");
+}
+
+std::string ManifestJson(const Manifest& manifest) {
   ordered_json out = {{"status", ToString(manifest.status)},
                       {"start", manifest.start},
                       {"end", manifest.end},
                       {"steps", manifest.steps},
                       {"wall_seconds", manifest.wall_seconds},
                       {"cpu_seconds", manifest.cpu_seconds},
-                      {"cpu", CpuModel()}};
+                      {"cpu", CpuModel()},
+                      {"revision", manifest.revision}};
   AddBuild(out);
-  WriteFileAtomically(dir / "manifest.json", out.dump(2) + "\n");
+  return out.dump(2) + "\n";
+}
+
+void WriteManifest(const std::filesystem::path& dir, const Manifest& manifest) {
+  WriteFileAtomically(dir / "manifest.json", ManifestJson(manifest));
 }
 
 std::optional<Manifest> ReadManifest(const std::filesystem::path& dir) {
@@ -72,24 +77,8 @@ std::optional<Manifest> ReadManifest(const std::filesystem::path& dir) {
     manifest.steps = in.at("steps").get<std::int64_t>();
     manifest.wall_seconds = in.at("wall_seconds").get<double>();
     manifest.cpu_seconds = in.at("cpu_seconds").get<double>();
+    manifest.revision = in.value("revision", 1);
     return manifest;
-  } catch (const std::exception& e) {
-    throw Error(Concat(path.string(), ": cannot be read: ", e.what()));
-  }
-}
-
-std::string RecordJson(const Manifest& manifest, const std::string& config) {
-  ordered_json out = {{"status", ToString(manifest.status)}, {"steps", manifest.steps}};
-  AddBuild(out);
-  out["config"] = config;
-  return out.dump(2) + "\n";
-}
-
-Record ReadRecord(const std::filesystem::path& path) {
-  try {
-    const ordered_json in = ordered_json::parse(ReadFile(path));
-    return {ParseStatus(in.at("status").get<std::string>()), in.at("steps").get<std::int64_t>(),
-            in.at("config").get<std::string>()};
   } catch (const std::exception& e) {
     throw Error(Concat(path.string(), ": cannot be read: ", e.what()));
   }

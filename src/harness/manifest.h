@@ -11,6 +11,8 @@ namespace o2v {
 /// `running` is also what a killed run leaves behind.
 enum class RunStatus { kRunning, kDone, kDiverged, kStopped };
 std::string ToString(RunStatus status);
+/// Throws Error for an unknown name.
+RunStatus ParseStatus(const std::string& name);
 
 /// What changes from run to run; commit, compiler, flags, versions and host are added when written.
 struct Manifest {
@@ -19,24 +21,14 @@ struct Manifest {
   std::int64_t steps = 0;   // environment steps of all workers
   double wall_seconds = 0;  // over all processes that worked on the run
   double cpu_seconds = 0;
+  int revision = 1;  // of the method's code
 };
 
+/// Text of a manifest.json.
+std::string ManifestJson(const Manifest& manifest);
 /// Writes `dir`/manifest.json.
 void WriteManifest(const std::filesystem::path& dir, const Manifest& manifest);
 /// The manifest of a run folder, nothing when it has none. Throws Error when it cannot be read.
 std::optional<Manifest> ReadManifest(const std::filesystem::path& dir);
-
-/// What made a record: {"status", "steps", "config" (resolved, TOML), "commit", "compiler",
-/// "flags", "versions"}, as JSON.
-std::string RecordJson(const Manifest& manifest, const std::string& config);
-
-/// The part of a record that a summary needs.
-struct Record {
-  RunStatus status;
-  std::int64_t steps;  // environment steps of all workers
-  std::string config;  // resolved, TOML
-};
-/// Reads a file of RecordJson. Throws Error when it cannot be read.
-Record ReadRecord(const std::filesystem::path& path);
 
 }  // namespace o2v

@@ -13,8 +13,7 @@ namespace o2v {
 namespace {
 
 constexpr char kEpisodesHeader[] = "step,worker,return,length,terminated,truncated";
-constexpr int kSmoothing = 20;          // episodes; the authors' plotting scripts
-constexpr std::int64_t kGrid = 10'000;  // [environment steps] ours: 100 rows a million steps
+constexpr int kSmoothing = 20;  // episodes; the authors' plotting scripts
 
 std::string UpdatesHeader(const std::vector<std::string>& stat_names) {
   std::string header = "step";
@@ -127,6 +126,11 @@ std::vector<CurvePoint> ReadEpisodes(const std::filesystem::path& path) {
   return episodes;
 }
 
+CsvTable ReadUpdates(const std::filesystem::path& path) {
+  const std::string text = ReadFile(path);
+  return std::ranges::count(text, '\n') > 1 ? ReadCsv(path) : CsvTable{};
+}
+
 std::vector<CurvePoint> SmoothedReturns(std::span<const CurvePoint> episodes) {
   std::vector<CurvePoint> curve;
   for (std::size_t end = kSmoothing; end <= episodes.size(); ++end) {
@@ -135,18 +139,6 @@ std::vector<CurvePoint> SmoothedReturns(std::span<const CurvePoint> episodes) {
     curve.emplace_back(episodes[end - 1].first, sum / kSmoothing);
   }
   return curve;
-}
-
-std::string RecordCsv(std::span<const CurvePoint> episodes, std::int64_t steps) {
-  const std::vector<CurvePoint> curve = SmoothedReturns(episodes);
-  std::string text = "step,return_20\n";
-  std::size_t known = 0;  // points of the curve at or before the grid step
-  for (std::int64_t step = 0; step < steps;) {
-    step = std::min(step + kGrid, steps);
-    while (known < curve.size() && curve[known].first <= step) ++known;
-    if (known > 0) text += Decimal(step) + "," + Decimal(curve[known - 1].second) + "\n";
-  }
-  return text;
 }
 
 }  // namespace o2v

@@ -1,5 +1,5 @@
 #pragma once
-// The CSV files of a run folder, and the record that is kept of a finished run.
+// The CSV files of a run folder.
 
 #include <cstdint>
 #include <filesystem>
@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/csv.h"
 #include "base/state.h"
 #include "rollout/vec_env.h"
 
@@ -70,10 +71,7 @@ std::vector<CurvePoint> SmoothedReturns(std::span<const CurvePoint> episodes);
 
 /// (step, return) of every row of an episodes.csv.
 std::vector<CurvePoint> ReadEpisodes(const std::filesystem::path& path);
-
-/// The record of a finished run, as CSV: `step,return_20` on a grid of 10 000 steps up to `steps`
-/// (and `steps` itself), the last smoothed value at or before the grid step, not interpolated; no
-/// row before the first. The row of step 1 000 000 is therefore exactly return_at_1M.
-std::string RecordCsv(std::span<const CurvePoint> episodes, std::int64_t steps);
+/// An updates.csv; a table without columns when no update was made.
+CsvTable ReadUpdates(const std::filesystem::path& path);
 
 }  // namespace o2v

@@ -14,9 +14,9 @@
 #include "base/csv.h"
 #include "base/files.h"
 #include "embedded/reference.h"
+#include "env/pairs.h"
 #include "harness/config.h"
-#include "harness/manifest.h"
-#include "harness/metrics.h"
+#include "harness/record.h"
 
 namespace o2v {
 namespace {
@@ -28,7 +28,13 @@ constexpr std::uint64_t kBootstrapSeed = 2021;  // any number: makes the interva
 
 // Method ids and the names in the authors' tables.
 const std::map<std::string, std::string, std::less<>> kPublishedNames = {
-    {"ppo", "PPO"}, {"option2vec", "Option2Vec"}};
+    {"ppo", "PPO"},
+    {"ppoc", "PPOC"},
+    {"oc", "OC"},
+    {"ahp_ppo", "AHP+PPO"},
+    {"dac_ppo", "DAC+PPO"},
+    {"iopg", "IOPG"},
+    {"option2vec", "Option2Vec"}};
 
 /// Rows of an embedded reference file, without its header.
 std::vector<std::vector<std::string>> ReferenceRows(std::string_view name) {
@@ -51,15 +57,19 @@ std::vector<std::vector<std::string>> ReferenceRows(std::string_view name) {
 struct RunRecord {
   Record meta;
   std::int64_t wanted_steps;      // of its config
+  std::int64_t tasks;             // that they are spent on, one after the other
   std::vector<CurvePoint> curve;  // smoothed returns, by step
 };
 
 RunRecord ReadRun(const fs::path& json) {
   RunRecord run;
   run.meta = ReadRecord(json);
-  run.wanted_steps = ParseRunConfig(run.meta.config, json.string()).steps;
+  const RunConfig config = ParseRunConfig(run.meta.config, json.string());
+  run.wanted_steps = config.steps;
+  run.tasks = static_cast<std::int64_t>(SplitTasks(config.task).size());
   const fs::path csv = fs::path(json).replace_extension(".csv");
-  if (ReadFile(csv) == RecordCsv({}, 0)) return run;  // fewer than 20 episodes
+  const std::string text = ReadFile(csv);
+  if (std::count(text.begin(), text.end(), '\n') == 1) return run;  // fewer than 20 episodes
   const CsvTable table = ReadCsv(csv);
   const std::size_t step = table.Column("step"), ret = table.Column("return_20");
   for (std::size_t i = 0; i < table.Rows(); ++i) {
@@ -68,12 +78,15 @@ RunRecord ReadRun(const fs::path& json) {
   return run;
 }
 
+/// The row at the end of task `task` (from 1), or of one million steps on it.
 SummaryRow MakeRow(const std::tuple<std::string, std::string, std::string>& key,
-                   const std::vector<RunRecord>& runs) {
+                   const std::vector<RunRecord>& runs, std::int64_t task) {
   SummaryRow row;
   std::tie(row.fidelity, row.task, row.algorithm) = key;
-  row.step = kMillion;
-  for (const RunRecord& run : runs) row.step = std::min(row.step, run.wanted_steps);
+  row.step = kMillion * task;
+  for (const RunRecord& run : runs) {
+    row.step = std::min(row.step, run.wanted_steps * task / run.tasks);
+  }
   for (const RunRecord& run : runs) {
     const auto after = std::find_if(run.curve.begin(), run.curve.end(),
                                     [&](const auto& point) { return point.first > row.step; });
@@ -109,19 +122,24 @@ std::optional<Published> PublishedReturn(const std::string& task, const std::str
                                          std::int64_t step) {
   const auto name = kPublishedNames.find(algorithm);
   if (name == kPublishedNames.end()) return std::nullopt;
-  if (step >=
-      kMillion) {  // suite,env,algorithm,embed_dim,run,steps_logged,return_at_1M,return_last
+  const bool pair = SplitTasks(task).size() > 1;
+  if (step >= kMillion && (!pair || step == kMillion || step >= 2 * kMillion)) {
+    // suite,env,algorithm,embed_dim,run,steps_logged,return_at_1M,return_last
+    // pair,first_task,second_task,algorithm,embed_dim,run,return_task1_end,return_task2_end,...
     std::vector<double> returns;
-    for (const auto& row : ReferenceRows("single_task_runs.csv")) {
-      if (row.at(0) == "final" && row.at(1) == task && row.at(2) == name->second) {
+    for (const auto& row : ReferenceRows(pair ? "transfer_runs.csv" : "single_task_runs.csv")) {
+      if (pair && row.at(0) == task && row.at(3) == name->second) {
+        returns.push_back(std::stod(row.at(step == kMillion ? 6 : 7)));
+      }
+      if (!pair && row.at(0) == "final" && row.at(1) == task && row.at(2) == name->second) {
         returns.push_back(std::stod(row.at(6)));
       }
     }
     if (returns.empty()) return std::nullopt;
     return Published{Mean(returns), Std(returns), static_cast<int>(returns.size())};
   }
-  std::vector<std::pair<std::int64_t, Published>> curve;  // env,algorithm,step,mean,std,n
-  for (const auto& row : ReferenceRows("single_task_curves.csv")) {
+  std::vector<std::pair<std::int64_t, Published>> curve;  // env or pair,algorithm,step,mean,std,n
+  for (const auto& row : ReferenceRows(pair ? "transfer_curves.csv" : "single_task_curves.csv")) {
     if (row.at(0) != task || row.at(1) != name->second) continue;
     curve.emplace_back(std::stoll(row.at(2)),
                        Published{std::stod(row.at(3)), std::stod(row.at(4)), std::stoi(row.at(5))});
@@ -153,7 +171,9 @@ std::vector<SummaryRow> Summarize(const fs::path& experiment) {
   for (const auto& [key, by_file] : groups) {
     std::vector<RunRecord> runs;
     for (const auto& [file, run] : by_file) runs.push_back(run);
-    rows.push_back(MakeRow(key, runs));
+    for (std::int64_t task = 1; task <= runs[0].tasks; ++task) {
+      rows.push_back(MakeRow(key, runs, task));
+    }
   }
   return rows;
 }

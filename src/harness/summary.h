@@ -18,12 +18,14 @@ struct Published {
 };
 
 /// What the authors' runs returned at `step`: their return_at_1M from one million steps on, before
-/// that their mean curve (linear between grid points). Nothing where they have no runs, or for a
-/// method that is not theirs. Source: results/reference/README.md.
+/// that their mean curve (linear between grid points). For a pair (by its name) return_task1_end at
+/// one million and return_task2_end from two million steps on, the curve elsewhere. Nothing where
+/// they have no runs, or for a method that is not theirs. Source: results/reference/README.md.
 std::optional<Published> PublishedReturn(const std::string& task, const std::string& algorithm,
                                          std::int64_t step);
 
-/// One line of the table: the runs of one task, method and fidelity over seeds.
+/// One line of the table: the runs of one task or pair, method and fidelity over seeds, at the end
+/// of a task.
 struct SummaryRow {
   std::string fidelity, task, algorithm;
   std::int64_t step = 0;       // [environment steps] that the returns belong to
@@ -33,8 +35,9 @@ struct SummaryRow {
 };
 
 /// Reads the records seed-*.csv and seed-*.json below `experiment` (results/quick). `step` of a row
-/// is the least of the runs' own steps, at most 1 000 000. Rows sorted by fidelity, task and
-/// method. Throws ConfigError when there is no record at all, Error for a damaged one.
+/// is the end of a task: the least of the runs' own steps there, at most 1 000 000 a task. Rows
+/// sorted by fidelity, task and method. Throws ConfigError when there is no record at all, Error
+/// for a damaged one.
 std::vector<SummaryRow> Summarize(const std::filesystem::path& experiment);
 
 /// fidelity, task, algorithm, step, n_seeds, mean, std, stderr, iqm, ci_low, ci_high as CSV: std

@@ -16,9 +16,11 @@
 
 #include "base/check.h"
 #include "base/files.h"
+#include "env/pairs.h"
 #include "harness/checkpoint.h"
 #include "harness/evaluate.h"
 #include "harness/metrics.h"
+#include "harness/record.h"
 
 namespace o2v {
 namespace {
@@ -87,6 +89,9 @@ void PrepareFolder(const fs::path& dir, const std::string& config, bool resume,
         throw ConfigError(Concat(dir.string(), ": holds ", entry.path().filename().string(),
                                  " but no config.toml: not a folder of a run"));
       }
+    }
+    if (const fs::path record = RecordPath(dir, ".json"); fs::exists(record)) {
+      throw ConfigError(record.string() + ": the record of a finished run; move it away first");
     }
     WriteFileAtomically(path, config);
     return;
@@ -162,7 +167,7 @@ Metadata Describe(const RunConfig& config, const EnvSpec& spec, Algorithm& algor
                   std::int64_t total_steps) {
   std::string switches;
   for (const SwitchInfo& info : SwitchRegistry()) {
-    if (!info.Concerns(config.algorithm)) continue;
+    if (!Concerns(info, config)) continue;
     switches +=
         (switches.empty() ? "" : " ") + info.name + "=" + SwitchValue(config.switches, info);
   }
@@ -184,7 +189,7 @@ class Run {
         parts_(parts),
         hooks_(hooks),
         dir_(dir),
-        env_(parts.make_env, config.workers, config.seed),
+        env_(MakeTask(0), config.workers, config.seed),
         algorithm_(parts.make_algorithm(env_.Spec())),
         stat_names_(algorithm_->StatNames()),
         logs_(dir, stat_names_, config.eval_every > 0),
@@ -194,10 +199,17 @@ class Run {
   /// before.
   void Start(const std::optional<Manifest>& before) {
     manifest_.start = before ? before->start : Now();
+    manifest_.revision = parts_.revision;
     wall_before_ = before ? before->wall_seconds : 0;
     cpu_before_ = before ? before->cpu_seconds : 0;
     const fs::path path = Checkpoint();
     if (fs::exists(path)) {
+      if (parts_.tasks > 1) {
+        const Metadata of_file = ReadMetadata(path);
+        const auto steps = of_file.find("total_steps");
+        task_ = TaskAt(steps == of_file.end() ? 0 : std::atoll(steps->second.c_str()));
+        env_.ReplaceEnvs(MakeTask(task_));
+      }
       const Metadata metadata = LoadCheckpoint(path, *algorithm_, Walk());
       Check(metadata == Describe(config_, env_.Spec(), *algorithm_, env_.TotalSteps()),
             path.string(), ": the checkpoint of another run: its metadata do not fit config.toml");
@@ -217,6 +229,7 @@ class Run {
       Iterate();
       const std::int64_t now = env_.TotalSteps();
       const bool done = now >= config_.steps;
+      if (TaskAt(now) != task_) ChangeTask();
       const bool stop = !done && hooks_.stop && hooks_.stop();
       const double rate = static_cast<double>(now - before) / Seconds(Clock::now() - begin);
       timing.Row(now, Wall(), Cpu(), rate);
@@ -232,17 +245,11 @@ class Run {
     LogEpisodes();  // of a rollout that diverged
     logs_.Flush();
     manifest_.end = Now();
-    manifest_.status = status;
-    manifest_.steps = env_.TotalSteps();
+    Stamp(status);
     if (status != RunStatus::kStopped) {
-      const auto episodes = ReadEpisodes(dir_ / "episodes.csv");
-      fs::path record = dir_;
-      WriteFileAtomically(record += ".csv",
-                          RecordCsv(episodes, std::min(config_.steps, env_.TotalSteps())));
-      WriteFileAtomically(record.replace_extension(".json"),
-                          RecordJson(manifest_, ToToml(config_)));
+      WriteRecord(dir_, ManifestJson(manifest_), config_.steps);
     }
-    Record(status);
+    WriteManifest(dir_, manifest_);
   }
 
  private:
@@ -256,6 +263,23 @@ class Run {
       env_.Visit(v);
       logs_.Visit(v);
     };
+  }
+
+  VecEnv::Factory MakeTask(int task) const {
+    return [this, task] { return parts_.make_env(task); };
+  }
+
+  /// The task after the update that ends at `step`: the next one from beyond its segment's end.
+  int TaskAt(std::int64_t step) const {
+    int task = 0;
+    while (task + 1 < parts_.tasks && step * parts_.tasks > config_.steps * (task + 1)) ++task;
+    return task;
+  }
+
+  void ChangeTask() {
+    task_ = TaskAt(env_.TotalSteps());
+    env_.ChangeTask(MakeTask(task_), config_.switches.switch_init_flag == Fidelity::kPaper);
+    algorithm_->ChangeTask();
   }
 
   void Iterate() {
@@ -279,7 +303,7 @@ class Run {
   }
 
   void LogEvaluation() {
-    const std::unique_ptr<Env> env = parts_.make_env();
+    const std::unique_ptr<Env> env = parts_.make_env(task_);
     const auto episodes = Evaluate(*algorithm_, env_.normalizer(), *env, config_.eval_episodes,
                                    /*sample_action=*/true, config_.seed);
     int number = 0;
@@ -295,11 +319,15 @@ class Run {
     Record(RunStatus::kRunning);
   }
 
-  void Record(RunStatus status) {
+  void Stamp(RunStatus status) {
     manifest_.status = status;
     manifest_.steps = env_.TotalSteps();
     manifest_.wall_seconds = Wall();
     manifest_.cpu_seconds = Cpu();
+  }
+
+  void Record(RunStatus status) {
+    Stamp(status);
     WriteManifest(dir_, manifest_);
   }
 
@@ -307,6 +335,7 @@ class Run {
   const RunParts& parts_;
   const RunHooks& hooks_;
   const fs::path dir_;
+  int task_ = 0;  // that the workers are on
   VecEnv env_;
   std::unique_ptr<Algorithm> algorithm_;
   const std::vector<std::string> stat_names_;
@@ -323,8 +352,19 @@ class Run {
 
 RunParts PartsOf(const RunConfig& config) {
   const EnvOptions options{.contact_forces = config.switches.contact_forces};
-  return {[=] { return MakeEnv(config.task, options); },
-          [&config](const EnvSpec& spec) { return MakeRunAlgorithm(config, spec); }};
+  const std::vector<std::string> tasks = SplitTasks(config.task);
+  const EnvSpec first = MakeEnv(tasks[0], options)->Spec();
+  for (const std::string& task : tasks) {
+    const EnvSpec spec = MakeEnv(task, options)->Spec();
+    if (spec.S != first.S || spec.A != first.A) {
+      throw ConfigError(Concat("tasks '", config.task, "': ", first.id, " has ", first.S,
+                               " observations and ", first.A, " actions, ", spec.id, " has ",
+                               spec.S, " and ", spec.A));
+    }
+  }
+  return {[=](int task) { return MakeEnv(tasks[std::size_t(task)], options); },
+          [&config](const EnvSpec& spec) { return MakeRunAlgorithm(config, spec); },
+          static_cast<int>(tasks.size()), FindAlgorithm(config.algorithm).revision};
 }
 
 RunStatus Train(const RunConfig& config, const RunParts& parts, const fs::path& dir, bool resume,

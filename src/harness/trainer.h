@@ -14,12 +14,16 @@
 
 namespace o2v {
 
-/// What a run is made of.
+/// What a run is made of. A run over n tasks is n equal segments of its steps: the next task
+/// replaces the last one after the first update beyond each. Source: spec 6.
 struct RunParts {
-  VecEnv::Factory make_env;
+  std::function<std::unique_ptr<Env>(int task)> make_env;  // tasks count from 0
   std::function<std::unique_ptr<Algorithm>(const EnvSpec&)> make_algorithm;
+  int tasks = 1;
+  int revision = 1;  // of the method's code, for the record
 };
-/// The task and the method that a config names; `config` must outlive the parts.
+/// The tasks and the method that a config names; `config` must outlive the parts. Throws
+/// ConfigError when the tasks' sizes differ.
 RunParts PartsOf(const RunConfig& config);
 
 /// Moments at which a run can be interrupted from outside; each may be empty.
@@ -41,7 +45,7 @@ struct RunHooks {
 /// `progress` gets one line that is rewritten (`terminal`) or one every 10 s.
 ///
 /// A finished or diverged run leaves its record beside the folder: `<dir>.csv`, the learning curve
-/// (see RecordCsv), and `<dir>.json`, what made it (see RecordJson).
+/// and `<dir>.json`, what made it (harness/record.h).
 RunStatus Train(const RunConfig& config, const RunParts& parts, const std::filesystem::path& dir,
                 bool resume, std::ostream& progress, bool terminal, const RunHooks& hooks = {});
 /// The same with PartsOf(config).

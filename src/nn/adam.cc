@@ -19,7 +19,10 @@ double ClipFactor(double norm, double clip_norm) {
 }
 
 Adam::Adam(std::vector<Param*> params, const Options& options)
-    : params_(std::move(params)), options_(options), t_(params_.size(), 0) {
+    : params_(std::move(params)),
+      options_(options),
+      t_(params_.size(), 0),
+      frozen_(params_.size(), 0) {
   for (const Param* p : params_) {
     m_.push_back(Mat::Zero(p->value.rows(), p->value.cols()));
     v_.push_back(m_.back());
@@ -38,6 +41,7 @@ double Adam::Step(std::span<const char> in_graph, IdleRule idle) {
   Real step = 0, root = 0;        // lr / (1 - beta1^t), 1 / sqrt(1 - beta2^t)
   for (std::size_t i = 0; i < params_.size(); ++i) {
     const bool started = t_[i] > 0;
+    if (frozen_[i]) continue;
     if (!in_graph[i] && (idle == IdleRule::kSkip || !started)) continue;
     const std::int64_t t = ++t_[i];
     if (t != corrected_t) {

@@ -38,6 +38,10 @@ class Adam {
   /// zero); the others follow the idle rule.
   double Step(std::span<const char> in_graph, IdleRule idle);
 
+  /// Tensor i is never stepped again, whatever the idle rule; its gradient must be zero from now
+  /// on.
+  void Freeze(std::size_t i) { frozen_.at(i) = 1; }
+
   /// Moments `adam.m.<name>`, `adam.v.<name>` and the counters `adam.t`.
   void Visit(StateVisitor& v);
 
@@ -46,6 +50,7 @@ class Adam {
   Options options_;
   std::vector<Mat> m_, v_;
   std::vector<std::int64_t> t_;  // steps of each tensor; 0: never had a gradient
+  std::vector<char> frozen_;
 };
 
 }  // namespace o2v

@@ -38,6 +38,23 @@ void VecEnv::Reset() {
   Observe();
 }
 
+void VecEnv::ReplaceEnvs(const Factory& make) {
+  for (std::unique_ptr<Env>& env : envs_) {
+    const EnvSpec old = env->Spec();
+    env = make();
+    const EnvSpec& spec = env->Spec();
+    Check(spec.S == old.S && spec.A == old.A, spec.id, ": sizes (", spec.S, ", ", spec.A,
+          "), not those of ", old.id, " (", old.S, ", ", old.A, ")");
+  }
+}
+
+void VecEnv::ChangeTask(const Factory& make, bool set_init) {
+  const std::vector<char> init = init_;
+  ReplaceEnvs(make);
+  Reset();
+  if (!set_init) init_ = init;
+}
+
 void VecEnv::Step(const Mat& a, Transition& out, std::vector<Episode>& episodes) {
   const EnvSpec& spec = Spec();
   const Index n = raw_.cols();

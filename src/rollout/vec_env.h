@@ -48,6 +48,12 @@ class VecEnv {
 
   /// Starts an episode in every worker and takes the observations into the normaliser.
   void Reset();
+  /// Puts the workers on another task of the same sizes and resets it; the running episodes are
+  /// forgotten, normaliser, streams and step counter go on. Unless `set_init`, Init() stays as it
+  /// was: the new task looks like a continuation of the old episode. Source: spec 6.
+  void ChangeTask(const Factory& make, bool set_init);
+  /// Puts the workers on another task without touching anything else, for Visit to fill in.
+  void ReplaceEnvs(const Factory& make);
   /// Steps every worker with a (A, N), clipped here to the control range. Appends ended episodes.
   void Step(const Mat& a, Transition& out, std::vector<Episode>& episodes);
 

@@ -73,6 +73,23 @@ std::vector<double> Training(const RunConfig& config) {
   return out;
 }
 
+/// Parameters after an iteration before and one after a change of task in the middle of episodes.
+std::vector<double> Transfer(const RunConfig& config) {
+  // Workers of different time limits: IOPG's iterations end with an episode of one of them.
+  VecEnv env([i = 0]() mutable { return std::make_unique<PointEnv>(13 + 4 * (i++ % 2)); },
+             config.workers, /*seed=*/3);
+  env.Reset();
+  const auto algorithm = MakeRunAlgorithm(config, env.Spec());
+  Iterate(*algorithm, env);
+  env.ChangeTask([] { return std::make_unique<PointEnv>(13); },
+                 config.switches.switch_init_flag == Fidelity::kPaper);
+  algorithm->ChangeTask();
+  Iterate(*algorithm, env);
+  std::vector<double> out;
+  AppendValues(out, *algorithm);
+  return out;
+}
+
 /// The same where advantages are of the order 1e-6: values 0 and tiny rewards.
 std::vector<double> TrainingOnTinyRewards(const RunConfig& config) {
   VecEnv env = PointTask(config.workers, /*time_limit=*/5, /*scale=*/1e-6);
@@ -151,6 +168,8 @@ const std::vector<Effect> kEffects = {
     {"o2v_init_relu", Losses},
     {"o2v_query", Losses},
     {"o2v_prev_embed_grad", Losses},
+    {"o2v_freeze", Transfer, {}, {"adam_idle=released"}},
+    {"switch_init_flag", Transfer},
     {"contact_forces", AntObservations},
 };
 
@@ -161,6 +180,9 @@ Switches Flipped(Switches switches, const SwitchInfo& info) {
     choice = choice == Fidelity::kPaper ? Fidelity::kReleased : Fidelity::kPaper;
   } else if (info.flag) {
     switches.*info.flag = !(switches.*info.flag);
+  } else if (info.freeze) {
+    Freeze& freeze = switches.*info.freeze;
+    freeze = freeze == Freeze::kPaper ? Freeze::kReleased : Freeze::kPaper;
   } else {
     double& number = switches.*info.number;
     const double other = number == info.paper ? info.released : info.paper;

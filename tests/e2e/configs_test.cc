@@ -14,7 +14,7 @@ class PaperConfigs : public testing::TestWithParam<const char*> {};
 
 TEST_P(PaperConfigs, EveryRunOfTheFirstSeedMakesTwoUpdates) {
   JobQuery query;
-  query.config = GetParam();
+  query.configs = {GetParam()};
   query.results = testing::TempDir() + "/configs";
   query.seeds = {0};
   for (Job& job : ListJobs(query)) {
@@ -22,7 +22,7 @@ TEST_P(PaperConfigs, EveryRunOfTheFirstSeedMakesTwoUpdates) {
     const bool rollouts = job.config.hyper.Has("rollout");
     if (rollouts) job.config.hyper.Set("rollout", 32, "test");
     const RunParts parts = PartsOf(job.config);
-    VecEnv env(parts.make_env, job.config.workers, job.config.seed);
+    VecEnv env([&] { return parts.make_env(0); }, job.config.workers, job.config.seed);
     auto algorithm = parts.make_algorithm(env.Spec());
     env.Reset();
     std::vector<Episode> episodes;
@@ -38,7 +38,8 @@ TEST_P(PaperConfigs, EveryRunOfTheFirstSeedMakesTwoUpdates) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Embedded, PaperConfigs, testing::Values("quick", "ci"),
+INSTANTIATE_TEST_SUITE_P(Embedded, PaperConfigs,
+                         testing::Values("quick", "ci", "single_task", "transfer"),
                          [](const auto& info) { return std::string(info.param); });
 
 }  // namespace

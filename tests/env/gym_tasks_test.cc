@@ -1,4 +1,4 @@
-// The rules of the single tasks: ends, noise, rewards' oddities. Sizes are in registry_test.cc;
+// The rules of the single gym tasks: ends, noise, rewards' oddities. Sizes are in registry_test.cc;
 // values beside the reference's in tests/parity.
 
 #include <gtest/gtest.h>
@@ -13,10 +13,6 @@ namespace {
 // ---- Ends. States within 0.02 of an edge on both sides; the rule is applied to the state after
 // the step, which must have come within 1e-3 of the edge on both sides for the test to mean
 // anything.
-
-void LetFloat(TaskUnderTest& task) {
-  const_cast<mjModel&>(task.env->model()).opt.disableflags |= mjDSBL_GRAVITY | mjDSBL_CONSTRAINT;
-}
 
 struct Edge {
   std::string task;

@@ -80,7 +80,7 @@ TEST_P(EveryTask, ALoadedStateGoesOnAsTheSavedOne) {
   Play(saved, 37);
   // Where the model has constraints one is active, so that qacc_warmstart matters.
   for (int i = 0; i < 200 && saved.env->data().nefc == 0; ++i) Play(saved, 1);
-  loaded.Reset();
+  for (int episode = 0; episode < 2; ++episode) loaded.Reset();  // another one than the saved one
   SavingVisitor visitor;
   saved.env->Visit(visitor, "worker0.");
   LoadingVisitor loading(visitor);

@@ -6,7 +6,7 @@
 namespace o2v {
 namespace {
 
-// Source: spec/environments.md, Gym -v2 tasks; actions and bounds from the model dumps.
+// Source: spec/environments.md; actions and bounds from the model dumps.
 struct Fact {
   const char* id;
   int S, A, limit;
@@ -18,9 +18,16 @@ constexpr Fact kFacts[] = {
     {"Swimmer-v2", 8, 2, 1000, 1},          {"Reacher-v2", 11, 2, 50, 1},
     {"Humanoid-v2", 376, 17, 1000, 0.4},    {"HumanoidStandup-v2", 376, 17, 1000, 0.4},
     {"InvertedPendulum-v2", 4, 1, 1000, 3}, {"InvertedDoublePendulum-v2", 11, 1, 1000, 1},
+    {"dm-cartpole-balance", 5, 1, 1000, 1}, {"dm-cartpole-balance_sparse", 5, 1, 1000, 1},
+    {"dm-reacher-easy", 6, 2, 1000, 1},     {"dm-reacher-hard", 6, 2, 1000, 1},
+    {"dm-cheetah-run", 17, 6, 1000, 1},     {"dm-cheetah-backward", 17, 6, 1000, 1},
+    {"dm-fish-upright", 21, 5, 1000, 1},    {"dm-fish-downleft", 21, 5, 1000, 1},
+    {"dm-walker-squat", 24, 6, 1000, 1},    {"dm-walker-stand", 24, 6, 1000, 1},
+    {"dm-walker-walk", 24, 6, 1000, 1},     {"dm-walker-backward", 24, 6, 1000, 1},
 };
 
-TEST(EnvRegistry, HoldsTheGymTasksWithTheirFacts) {
+TEST(EnvRegistry, HoldsAllTasksWithTheirFacts) {
+  EXPECT_EQ(EnvRegistry().size(), std::size(kFacts));
   for (const Fact& fact : kFacts) {
     const EnvSpec spec = MakeEnv(fact.id, EnvOptions{})->Spec();
     EXPECT_EQ(spec.id, fact.id);

@@ -94,6 +94,32 @@ TEST(Replay, RefusesMissingAndAdditionalColumns) {
             "t.csv:1: expected 6 columns for InvertedPendulum-v2 ('qvel1' is the last), got 7");
 }
 
+TEST(Replay, PutsATargetWhereTheRowsWithStepZeroSay) {
+  CsvTable table{
+      "t.csv",
+      {"step", "ctrl0", "ctrl1", "qpos0", "qpos1", "qvel0", "qvel1", "target0", "target1"},
+      {0, 0, 0, 1, 2, 0, 0, 0.1, 0.2,  //
+       1, 0, 0, 0, 0, 0, 0, 0.3, 0.4}};
+  TaskUnderTest task("dm-reacher-hard");
+  CsvTable ours = Replay(*task.env, table);
+  EXPECT_EQ(task.env->Target()[0], 0.1);
+  EXPECT_EQ(task.env->Target()[1], 0.2);
+  EXPECT_EQ(ours.At(1, 7), 0.1) << "it does not move during an episode";
+  EXPECT_EQ(ours.At(1, 8), 0.2);
+  EXPECT_EQ(ours.At(1, 3), 1) << "at rest";
+  for (std::string& column : table.columns) {
+    if (column == "target1") column = "target2";
+  }
+  EXPECT_EQ(ConfigErrorOf("dm-reacher-hard", table),
+            "t.csv:1: column 9: expected 'target1' for dm-reacher-hard, got 'target2'");
+}
+
+TEST(Replay, RefusesATargetForATaskWithoutOne) {
+  CsvTable table{"t.csv", {"step", "ctrl0", "qpos0", "qpos1", "qvel0", "qvel1", "target0"}, {}};
+  EXPECT_EQ(ConfigErrorOf("dm-cartpole-balance", table),
+            "t.csv:1: expected 6 columns for dm-cartpole-balance ('qvel1' is the last), got 7");
+}
+
 TEST(Replay, RefusesStepsThatDoNotCountUp) {
   CsvTable table{"t.csv",
                  {"step", "ctrl0", "qpos0", "qpos1", "qvel0", "qvel1"},

@@ -63,6 +63,11 @@ class TaskUnderTest {
   }
 };
 
+/// Takes gravity, contacts and limits away: what rests stays where it is put.
+inline void LetFloat(TaskUnderTest& task) {
+  task.env->model().opt.disableflags |= mjDSBL_GRAVITY | mjDSBL_CONSTRAINT;
+}
+
 /// All that a caller sees of a step, as bytes.
 inline std::string Bytes(const TaskUnderTest& task, const StepResult& result) {
   std::string bytes;

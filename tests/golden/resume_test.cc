@@ -100,6 +100,7 @@ class KilledAlgorithm final : public Algorithm {
   void OptionValues(const Mat& s, const std::vector<int>& o, Mat& q) override {
     algorithm_->OptionValues(s, o, q);
   }
+  void ChangeTask() override { algorithm_->ChangeTask(); }
   std::vector<std::string> Stages() const override { return algorithm_->Stages(); }
   LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) override {
     return algorithm_->Loss(stage, batch, fixed);
@@ -130,7 +131,9 @@ void TrainUntilKilled(const RunConfig& config, const std::filesystem::path& dir,
   const RunParts real = parts;
   switch (moment) {
     case Moment::kRollout:
-      parts.make_env = [&] { return std::make_unique<KillingEnv>(real.make_env(), killer); };
+      parts.make_env = [&](int task) {
+        return std::make_unique<KillingEnv>(real.make_env(task), killer);
+      };
       break;
     case Moment::kUpdate:
       parts.make_algorithm = [&](const EnvSpec& spec) {
@@ -199,6 +202,10 @@ std::vector<KilledCase> Cases() {
           cases.push_back({{task, method.id, Fidelity::kPaper, workers}, /*kills=*/8});
         }
         cases.push_back({{task, method.id, Fidelity::kReleased, /*workers=*/4}, /*kills=*/2});
+      }
+      for (const char* task : {"dm-cartpole-balance", "dm-reacher-hard", "dm-cheetah-run",
+                               "dm-fish-downleft", "dm-walker-walk"}) {
+        cases.push_back({{task, method.id, Fidelity::kPaper, /*workers=*/4}, /*kills=*/2});
       }
     } else {
       for (const Fidelity fidelity : {Fidelity::kPaper, Fidelity::kReleased}) {

@@ -4,9 +4,11 @@
 
 #include <cmath>
 #include <limits>
+#include <set>
 #include <string>
 
 #include "base/check.h"
+#include "env/pairs.h"
 
 namespace o2v {
 namespace {
@@ -92,6 +94,63 @@ TEST(ResolveRun, Option2VecHasOneWorkerOnFiveReleasedTasksAndFourElsewhere) {
     EXPECT_EQ(released.hyper.Int("embedding"), 40) << task.id;
     EXPECT_EQ(released.hyper.Int("hidden"), 64) << task.id;
   }
+}
+
+TEST(ResolveRun, APairIsItsTwoTasksForTwoMillionSteps) {
+  const RunConfig named = ResolveRun(Request("option2vec", "Cheetah"));
+  EXPECT_EQ(named.task, "dm-cheetah-run,dm-cheetah-backward");
+  EXPECT_EQ(named.steps, 2'000'000);
+  EXPECT_EQ(ToToml(ResolveRun(Request("option2vec", named.task))), ToToml(named));
+}
+
+TEST(ResolveRun, EmbeddingsOfReleasedPairsAreThoseOfTheLogs) {
+  for (const auto& [pair, D] : {std::pair{"CartPole", 20},
+                                {"Reacher", 30},
+                                {"Cheetah", 20},
+                                {"Fish", 20},
+                                {"Walker1", 30},
+                                {"Walker2", 20}}) {
+    const RunConfig released = ResolveRun(Request("option2vec", pair, "released"));
+    EXPECT_EQ(released.hyper.Int("embedding"), D) << pair;
+    EXPECT_EQ(released.workers, 4) << pair;
+    EXPECT_EQ(ResolveRun(Request("option2vec", pair)).hyper.Int("embedding"), 40) << pair;
+  }
+}
+
+TEST(ResolveRun, RivalsUseReluAndReleasedWidth128OnDeepMindControl) {
+  for (const AlgorithmEntry& entry : AlgorithmRegistry()) {
+    const std::string& method = entry.id;
+    if (method == "option2vec") continue;
+    for (const std::string task : {"Walker2", "dm-fish-upright"}) {
+      const RunConfig released = ResolveRun(Request(method, task, "released"));
+      EXPECT_EQ(released.hyper.Int("activation"), 1) << method << task;
+      EXPECT_EQ(released.hyper.Int("hidden"), 128) << method << task;
+      EXPECT_EQ(ResolveRun(Request(method, task)).hyper.Int("hidden"), 64) << method << task;
+    }
+    EXPECT_EQ(ResolveRun(Request(method, "Hopper-v2")).hyper.Int("activation"), 0) << method;
+  }
+}
+
+TEST(ResolveRun, SwitchesOfTransferBelongToRunsOverSeveralTasks) {
+  RunRequest pair = Request("option2vec", "Fish"), single = Request("option2vec", "Hopper-v2");
+  EXPECT_EQ(ResolveRun(pair).switches.o2v_freeze, Freeze::kPaper);
+  pair.fidelity = "released";
+  EXPECT_EQ(ResolveRun(pair).switches.o2v_freeze, Freeze::kReleased);
+  pair.set = single.set = {"o2v_freeze=policy"};
+  EXPECT_EQ(ResolveRun(pair).switches.o2v_freeze, Freeze::kPolicy);
+  EXPECT_NE(ToToml(ResolveRun(pair)).find("o2v_freeze = \"policy\""), std::string::npos);
+  EXPECT_EQ(Message([&] { ResolveRun(single); }).substr(0, 35),
+            "--set o2v_freeze=policy: unknown ke");
+  single.set = {};
+  EXPECT_EQ(ToToml(ResolveRun(single)).find("o2v_freeze"), std::string::npos);
+}
+
+TEST(ResolveRun, RefusesAnUnknownTaskOfAPair) {
+  const std::string message =
+      Message([] { ResolveRun(Request("ppo", "dm-cheetah-run,dm-cheetah-backwards")); });
+  EXPECT_NE(message.find("unknown task 'dm-cheetah-backwards'"), std::string::npos) << message;
+  EXPECT_NE(message.find("dm-cheetah-backward"), std::string::npos) << message;
+  EXPECT_NE(Message([] { ResolveRun(Request("ppo", "Hopper-v2,")); }), "");
 }
 
 TEST(ResolveRun, FidelitySetsAllSwitches) {
@@ -292,7 +351,16 @@ TEST(ReadExperiment, ReadsTheListsOfTheEmbeddedFiles) {
   EXPECT_EQ(quick.tasks, (std::vector<std::string>{"InvertedPendulum-v2", "HalfCheetah-v2"}));
   EXPECT_EQ(quick.algorithms, (std::vector<std::string>{"ppo", "option2vec"}));
   EXPECT_EQ(quick.seeds, (std::vector<std::uint64_t>{0, 1}));
-  EXPECT_EQ(ReadExperiment(OpenConfig("ci")).tasks.size(), EnvRegistry().size());
+}
+
+TEST(ReadExperiment, TheSuiteOfCiHasEveryTaskAndMethod) {
+  const Experiment ci = ReadExperiment(OpenConfig("ci"));
+  std::set<std::string> tasks;
+  for (const std::string& task : ci.tasks) {
+    for (const std::string& id : SplitTasks(task)) tasks.insert(id);
+  }
+  EXPECT_EQ(tasks.size(), EnvRegistry().size());
+  EXPECT_EQ(ci.algorithms.size(), AlgorithmRegistry().size());
 }
 
 TEST(ReadExperiment, RefusesBadLists) {

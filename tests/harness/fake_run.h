@@ -13,6 +13,7 @@
 #include "base/files.h"
 #include "env/env.h"
 #include "harness/config.h"
+#include "harness/metrics.h"
 #include "harness/trainer.h"
 #include "test_folder.h"
 
@@ -140,10 +141,17 @@ inline RunConfig FakeConfig() {
 }
 
 inline RunParts FakeParts(const RunConfig& config) {
-  return {[] { return std::make_unique<FakeEnv>(); },
+  return {[](int) { return std::make_unique<FakeEnv>(); },
           [seed = config.seed](const EnvSpec& spec) {
             return std::make_unique<FakeAlgorithm>(spec, seed);
           }};
+}
+
+/// n episodes of 100 steps with returns 1, 2, ..., n.
+inline std::vector<CurvePoint> Rising(int n) {
+  std::vector<CurvePoint> episodes;
+  for (int i = 1; i <= n; ++i) episodes.emplace_back(100 * i, i);
+  return episodes;
 }
 
 /// The files of a run folder for which byte equality is promised.

@@ -7,6 +7,7 @@
 
 #include "base/check.h"
 #include "base/files.h"
+#include "harness/record.h"
 
 namespace o2v {
 namespace {
@@ -21,17 +22,21 @@ class Jobs : public testing::Test {
   JobQuery Query() const {
     JobQuery query;
     query.program = "./option2vec";
-    query.config = "quick";
+    query.configs = {"quick"};
     query.results = results_;
     return query;
   }
   /// Leaves behind what a run with this status does.
-  void Leave(const Job& job, RunStatus status) const {
+  void Leave(const Job& job, RunStatus status, int revision = 1) const {
     fs::create_directories(job.dir);
     WriteFileAtomically(job.dir / "config.toml", ToToml(job.config));
     Manifest manifest;
     manifest.status = status;
     WriteManifest(job.dir, manifest);
+    if (status != RunStatus::kDone && status != RunStatus::kDiverged) return;
+    manifest.revision = revision;
+    WriteFileAtomically(RecordPath(job.dir, ".json"),
+                        RecordJson(ManifestJson(manifest), ToToml(job.config)));
   }
 
   const fs::path results_ =
@@ -59,6 +64,18 @@ TEST_F(Jobs, AreCommandsThatStartOrGoOn) {
             "./option2vec train --config quick --task HalfCheetah-v2 --algo ppo --fidelity paper "
             "--seed 12 --steps " +
                 steps + " --out results/quick/paper/HalfCheetah-v2/ppo/seed-012 --resume");
+}
+
+TEST_F(Jobs, OfSeveralExperimentsGoSeedBySeedToo) {
+  JobQuery query = Query();
+  query.configs = {"single_task", "transfer"};
+  query.algorithms = {"ppo"};
+  query.fidelities = {"paper"};
+  query.seeds = {3, 5};
+  const auto jobs = ListJobs(query);
+  ASSERT_EQ(jobs.size(), 2u * (10 + 6));
+  for (std::size_t i = 0; i < jobs.size(); ++i) EXPECT_EQ(jobs[i].config.seed, i < 16 ? 3u : 5u);
+  EXPECT_EQ(jobs[10].dir, results_ / "transfer/paper/CartPole/ppo/seed-003");
 }
 
 TEST_F(Jobs, QuoteWordsForTheShell) {
@@ -94,6 +111,34 @@ TEST_F(Jobs, FinishedAndDivergedRunsNeedNothingMore) {
   EXPECT_FALSE(jobs[4].finished);
 }
 
+TEST_F(Jobs, TheRecordIsEnoughToSkipARun) {
+  const Job job = ListJobs(Query())[0];
+  Leave(job, RunStatus::kDone);
+  fs::remove_all(job.dir);  // the raw folder is on another machine
+  EXPECT_EQ(ListJobs(Query())[0].finished, RunStatus::kDone);
+  EXPECT_FALSE(ListJobs(Query())[0].old);
+}
+
+TEST_F(Jobs, ARecordOfAnOlderRevisionIsMarked) {
+  const Job job = ListJobs(Query())[0];
+  Leave(job, RunStatus::kDone, FindAlgorithm(job.config.algorithm).revision - 1);
+  EXPECT_TRUE(ListJobs(Query())[0].old);
+}
+
+TEST_F(Jobs, PairsAreTasks) {
+  JobQuery query = Query();
+  query.configs = {"transfer"};
+  query.tasks = {"Cheetah"};
+  query.algorithms = {"ppo"};
+  query.fidelities = {"released"};
+  query.seeds = {0};
+  const auto jobs = ListJobs(query);
+  ASSERT_EQ(jobs.size(), 1u);
+  EXPECT_EQ(jobs[0].dir, results_ / "transfer/released/Cheetah/ppo/seed-000");
+  EXPECT_EQ(jobs[0].config.task, "dm-cheetah-run,dm-cheetah-backward");
+  EXPECT_EQ(jobs[0].config.steps, 2'000'000);
+}
+
 TEST_F(Jobs, ARunFinishedWithAnotherConfigIsRefused) {
   Job job = ListJobs(Query())[0];
   job.config.steps += 1;
@@ -102,9 +147,9 @@ TEST_F(Jobs, ARunFinishedWithAnotherConfigIsRefused) {
 }
 
 TEST_F(Jobs, EveryExperimentOfTheProgramResolves) {
-  for (const char* name : {"quick", "ci"}) {
+  for (const char* name : {"quick", "ci", "single_task", "transfer"}) {
     JobQuery query = Query();
-    query.config = name;
+    query.configs = {name};
     EXPECT_FALSE(ListJobs(query).empty()) << name;
   }
 }

@@ -48,18 +48,5 @@ TEST(Manifest, ThatCannotBeReadIsRefused) {
   }
 }
 
-TEST(RecordJson, HoldsConfigAndBuildButNoClock) {
-  Manifest manifest;
-  manifest.status = RunStatus::kDone;
-  manifest.start = "2026-01-02T03:04:05Z";
-  manifest.steps = 12;
-  const auto json = nlohmann::json::parse(RecordJson(manifest, "[run]\nseed = 1\n"));
-  EXPECT_EQ(json.at("status"), "done");
-  EXPECT_EQ(json.at("steps"), 12);
-  EXPECT_EQ(json.at("config"), "[run]\nseed = 1\n");
-  EXPECT_TRUE(json.contains("commit"));
-  EXPECT_FALSE(json.contains("start"));
-}
-
 }  // namespace
 }  // namespace o2v

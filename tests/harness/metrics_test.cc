@@ -110,34 +110,10 @@ TEST(ReadEpisodes, ReadsWhatTheLogWrote) {
   EXPECT_EQ(ReadEpisodes(dir / "episodes.csv"), (std::vector<CurvePoint>{{12, 0.1}}));
 }
 
-/// n episodes of 100 steps with returns 1, 2, ..., n.
-std::vector<CurvePoint> Rising(int n) {
-  std::vector<CurvePoint> episodes;
-  for (int i = 1; i <= n; ++i) episodes.emplace_back(100 * i, i);
-  return episodes;
-}
-
 TEST(SmoothedReturns, StandAtTheStepOfThe20thEpisode) {
   // Mean of 1..20 and of 2..21.
   EXPECT_EQ(SmoothedReturns(Rising(21)), (std::vector<CurvePoint>{{2000, 10.5}, {2100, 11.5}}));
   EXPECT_TRUE(SmoothedReturns(Rising(19)).empty());
-}
-
-TEST(RecordCsv, HoldsTheLastSmoothedValueAtOrBeforeTheGridStep) {
-  // 230 episodes: the 100th ends at step 10 000 (mean of 81..100), the 200th at 20 000.
-  EXPECT_EQ(RecordCsv(Rising(230), 21'000),
-            "step,return_20\n10000,90.5\n20000,190.5\n21000,200.5\n");
-  // Just before the 100th episode counts the 99th.
-  auto late = Rising(100);
-  late[99].first = 10'001;
-  EXPECT_EQ(RecordCsv(late, 10'000), "step,return_20\n10000,89.5\n");
-}
-
-TEST(RecordCsv, HasNoRowBeforeTheFirstValue) {
-  auto late = Rising(20);
-  late[19].first = 15'000;
-  EXPECT_EQ(RecordCsv(late, 20'000), "step,return_20\n20000,10.5\n");
-  EXPECT_EQ(RecordCsv(Rising(19), 20'000), "step,return_20\n");
 }
 
 }  // namespace

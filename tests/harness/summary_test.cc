@@ -9,7 +9,7 @@
 #include "base/check.h"
 #include "base/files.h"
 #include "harness/config.h"
-#include "harness/manifest.h"
+#include "harness/record.h"
 
 namespace o2v {
 namespace {
@@ -37,13 +37,24 @@ class Summary : public testing::Test {
     const std::string name = "seed-00" + std::to_string(seed);
     fs::create_directories(dir);
     WriteFileAtomically(dir / (name + ".csv"), "step,return_20\n" + curve);
-    WriteFileAtomically(dir / (name + ".json"), RecordJson(manifest, ToToml(ResolveRun(request))));
+    WriteFileAtomically(dir / (name + ".json"),
+                        RecordJson(ManifestJson(manifest), ToToml(ResolveRun(request))));
   }
 
   const fs::path root_ =
       fs::path(testing::TempDir()) /
       (std::string("summary_") + testing::UnitTest::GetInstance()->current_test_info()->name());
 };
+
+TEST_F(Summary, HasARowForTheEndOfEachTaskOfAPair) {
+  Record("Cheetah", 0, 2000000, "1000000,1\n1010000,2\n2000000,3\n");
+  const auto rows = Summarize(root_);
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].step, 1000000);
+  EXPECT_EQ(rows[0].values, (std::vector<double>{1}));
+  EXPECT_EQ(rows[1].step, 2000000);
+  EXPECT_EQ(rows[1].values, (std::vector<double>{3}));
+}
 
 TEST_F(Summary, TakesTheLastValueAtOrBeforeTheLeastStep) {
   Record("Hopper-v2", 0, 30000, "10000,1\n20000,2\n30000,30\n");
@@ -127,6 +138,19 @@ TEST(PublishedReturn, IsLinearBetweenGridPointsBeforeThat) {
   EXPECT_NE(low->mean, high->mean);
   EXPECT_DOUBLE_EQ(middle->mean, low->mean + (high->mean - low->mean) / 4);
   EXPECT_DOUBLE_EQ(middle->std, low->std + (high->std - low->std) / 4);
+}
+
+TEST(PublishedReturn, OfAPairIsTheTasksEndsAndTheCurveElsewhere) {
+  // Table of results/reference/README.md; the first task's end: mean of transfer_runs.csv.
+  const auto end1 = PublishedReturn("Cheetah", "option2vec", 1000000),
+             middle = PublishedReturn("Cheetah", "option2vec", 1500000),
+             end2 = PublishedReturn("Cheetah", "option2vec", 2000000);
+  ASSERT_TRUE(end1 && middle && end2);
+  EXPECT_NEAR(end1->mean, 285.2, 0.05);
+  EXPECT_NEAR(middle->mean, 80.0737, 1e-9);
+  EXPECT_NEAR(end2->mean, 234.0, 0.05);
+  EXPECT_NEAR(end2->std, 26.1, 0.05);
+  EXPECT_EQ(end2->n, 10);
 }
 
 TEST(PublishedReturn, IsNothingForOtherTasksAndMethods) {

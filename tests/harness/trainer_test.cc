@@ -242,7 +242,7 @@ TEST_F(Trainer, KeepsWhatADivergedRunHas) {
   };
   config_.eval_every = 0;
   int left = 99;  // in the tenth rollout, after three checkpoints
-  parts_.make_env = [&left] { return std::make_unique<Diverging>(left); };
+  parts_.make_env = [&left](int) { return std::make_unique<Diverging>(left); };
   EXPECT_THROW(Start("run"), DivergedError);
   EXPECT_EQ(ReadMetadata(dir_ / "run" / "last.ckpt").at("total_steps"), "90");
   const Manifest manifest = ReadManifest(dir_ / "run").value();

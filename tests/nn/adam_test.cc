@@ -106,6 +106,22 @@ TEST(Adam, IdleTensorsRestUnderTheSkipRule) {
   EXPECT_EQ(p.x.value(0), before);
 }
 
+TEST(Adam, FrozenTensorsRestUnderEveryRule) {
+  for (const IdleRule idle : {IdleRule::kSkip, IdleRule::kZeroGradient}) {
+    Pair p;
+    Adam adam(p.Params(), kOptions);
+    p.x.grad << 1;
+    p.y.grad << 1;
+    adam.Step(std::vector<char>{1, 1}, idle);
+    const Real x = p.x.value(0), y = p.y.value(0);
+    adam.Freeze(0);
+    p.y.grad << 1;
+    adam.Step(std::vector<char>{0, 1}, idle);
+    EXPECT_EQ(p.x.value(0), x);
+    EXPECT_LT(p.y.value(0), y);
+  }
+}
+
 TEST(Adam, EveryTensorCountsItsOwnSteps) {
   for (const IdleRule idle : {IdleRule::kSkip, IdleRule::kZeroGradient}) {
     Pair p;

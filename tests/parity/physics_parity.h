@@ -58,17 +58,23 @@ inline ParityRow TrajectoryParity(MujocoEnv& env, const std::filesystem::path& d
 }
 
 /// Rolls a task from the rows with step 0 and writes down what it returns: reward, terminated, obs.
-/// The rows' other columns stay as they are, and so does the last row, which is only a state.
+/// The rows' other columns stay as they are, and so does the last row of the gym tasks, which is
+/// only a state (its observation is all zero).
 inline CsvTable RollSteps(MujocoEnv& env, const CsvTable& reference) {
   const std::size_t width = reference.columns.size(), step = reference.Column("step");
   const std::size_t ctrl = reference.Column("ctrl0"), qpos = reference.Column("qpos0"),
                     qvel = reference.Column("qvel0"), reward = reference.Column("reward"),
                     terminated = reference.Column("terminated"), obs = reference.Column("obs0");
+  const std::span<double> target = env.Target();
   CsvTable ours = reference;
-  for (std::size_t row = 0; row + 1 < reference.Rows(); ++row) {
+  for (std::size_t row = 0; row < reference.Rows(); ++row) {
     const std::span<double> out(&ours.values[row * width], width);
     const std::span<double> out_obs = out.subspan(obs, std::size_t(env.Spec().S));
+    if (std::ranges::all_of(out_obs, [](double x) { return x == 0; })) break;
     if (reference.At(row, step) == 0) {
+      if (!target.empty()) {
+        std::ranges::copy(out.subspan(reference.Column("target0"), target.size()), target.begin());
+      }
       env.ResetTo(out.subspan(qpos, env.qpos().size()), out.subspan(qvel, env.qvel().size()),
                   out_obs);
     }

@@ -7,16 +7,26 @@
 namespace o2v {
 namespace {
 
+void ExpectPass(const ParityRow& row) {
+  EXPECT_LE(row.deviation, row.bound) << row.check << " of " << row.name << ": " << row.where;
+}
+
+// Of each model the first task: another one may have changed it (dm-reacher-hard's target).
+TEST(ModelParity, EveryModelIsTheReferences) {
+  std::vector<std::string> models;
+  for (const EnvEntry& entry : EnvRegistry()) {
+    const auto env = MakeMujocoEnv(entry.id);
+    if (std::ranges::count(models, env->ModelName())) continue;
+    models.push_back(env->ModelName());
+    ExpectPass(ModelParity(*env, O2V_TEST_DATA));
+  }
+  EXPECT_EQ(models.size(), 15u);  // ten of gym, five of DeepMind Control
+}
+
 class PhysicsParity : public testing::TestWithParam<std::string> {
  protected:
-  static void ExpectPass(const ParityRow& row) {
-    EXPECT_LE(row.deviation, row.bound) << row.check << " of " << row.name << ": " << row.where;
-  }
-
   std::unique_ptr<MujocoEnv> env_ = MakeMujocoEnv(GetParam());
 };
-
-TEST_P(PhysicsParity, TheModelIsTheReferences) { ExpectPass(ModelParity(*env_, O2V_TEST_DATA)); }
 
 TEST_P(PhysicsParity, TheTrajectoryIsTheReferences) {
   ExpectPass(TrajectoryParity(*env_, O2V_TEST_DATA));

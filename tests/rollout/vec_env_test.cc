@@ -229,6 +229,52 @@ TEST(VecEnv, GoesOnFromAStateThatWasKept) {
   EXPECT_EQ(others.back().ret, episodes.back().ret);
 }
 
+/// Three workers after one step, put on a task whose episodes take 9 steps.
+VecEnv AfterAChangeOfTask(bool set_init, int steps) {
+  VecEnv env = ThreeWorkers();
+  Transition t;
+  std::vector<Episode> episodes;
+  env.Reset();
+  for (int i = 0; i < steps; ++i) env.Step(Actions(), t, episodes);
+  env.ChangeTask([] { return std::make_unique<ScriptedEnv>(9, true, false, nullptr); }, set_init);
+  return env;
+}
+
+TEST(VecEnv, AChangeOfTaskStartsEpisodesAndKeepsTheRest) {
+  VecEnv env = AfterAChangeOfTask(true, 1);
+  EXPECT_EQ(env.Spec().time_limit, 9);
+  EXPECT_EQ(env.TotalSteps(), 3);
+  EXPECT_EQ(env.Init(), (std::vector<char>{1, 1, 1}));
+  // Three observations of each worker: reset, step, reset on the new task.
+  EXPECT_NEAR(env.normalizer().count(), 9 + 1e-4, 1e-12);
+  // The first step of the old task belongs to no episode.
+  Transition t;
+  std::vector<Episode> episodes;
+  for (int i = 0; i < 9; ++i) env.Step(Actions(), t, episodes);
+  ASSERT_EQ(episodes.size(), 3u);
+  EXPECT_EQ(episodes[1].length, 9);
+  EXPECT_DOUBLE_EQ(episodes[1].ret, 9 * 0.25);
+  EXPECT_EQ(episodes[1].step, 3 + 8 * 3 + 1);
+}
+
+TEST(VecEnv, AChangeOfTaskCanLookLikeAContinuation) {
+  EXPECT_EQ(AfterAChangeOfTask(false, 1).Init(), (std::vector<char>{0, 0, 0}));
+  // Worker 0's episode has just ended after two steps.
+  EXPECT_EQ(AfterAChangeOfTask(false, 2).Init(), (std::vector<char>{1, 0, 0}));
+}
+
+TEST(VecEnv, RefusesATaskOfOtherSizes) {
+  struct Wider final : public Env {
+    const EnvSpec& Spec() const override { return spec; }
+    void Reset(Rng&, std::span<double>) override {}
+    StepResult Step(std::span<const double>, std::span<double>) override { return {}; }
+    void Visit(StateVisitor&, const std::string&) override {}
+    EnvSpec spec{"Wider-v0", 3, 2, 9, {-1, -1}, {1, 1}};
+  };
+  VecEnv env = ThreeWorkers();
+  EXPECT_THROW(env.ChangeTask([] { return std::make_unique<Wider>(); }, true), Error);
+}
+
 TEST(VecEnv, RefusesActionsOfAnotherShape) {
   VecEnv env = OneWorker(3);
   Transition t;

@@ -1,0 +1,350 @@
+"""The paper's claims, judged from samples by definitions that are fixed here and printed with them.
+
+Every claim is a list of parts, most often one a task. A part holds, does not hold, is undecided, or
+is not measured; so does the claim: it holds when at least `needed` of its parts do, it does not
+when so many fail that `needed` is out of reach.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from scipy import stats
+
+from plots.records import FINITE, INFINITE, METHODS, PAIRS, TASKS, Rows
+from plots.samples import Sample, Samples
+from plots.statistics import (CONFIDENCE, STREAM, Difference, Moments, one_sample, seeds_needed,
+                              welch)
+from plots.text import interval, number, p_value
+
+HOLDS, FAILS, UNDECIDED, UNMEASURED = "holds", "does not hold", "undecided", "not measured"
+
+OURS = "option2vec"
+RIVALS = ("dac_ppo", "ahp_ppo", "ppoc", "oc", "ppo")  # needed; the authors have all on every task
+MORE_RIVALS = ("dac_onestep", "iopg")  # compared wherever they have runs
+MARGIN = 0.2  # of "comparable", the customary one of bioequivalence
+FLAT = 0.05  # of "converged": share of all progress
+GRADIENT_BOUND = 1e-6  # tests/grad_check.h
+SHARE = 0.158  # the paper's 15.8 %
+ROTATIONS = 1000
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """All that is known from one source: paper, released, or authors."""
+    source: str
+    samples: Samples
+    parameters: Mapping[str, int] = field(default_factory=dict)  # see parameter_counts
+    gradcheck: Rows = field(default_factory=list)
+    theory: Rows = field(default_factory=list)
+    effects: Mapping[Path, np.ndarray] = field(default_factory=dict)  # (D, A), by file
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A part of a claim."""
+    part: str
+    verdict: str
+    measured: str
+    n: tuple[int, ...] = ()  # seeds of Option2Vec and of the method it is compared with
+    leads: bool | None = None  # highest mean of all, where that is what it is about
+
+
+@dataclass(frozen=True)
+class Claim:
+    question: str
+    text: str
+    definition: str
+    needed: int
+    judge: Callable[[Evidence], Sequence[Finding]]
+
+
+def verdict_of(claim: Claim, findings: Sequence[Finding]) -> str:
+    """Of the whole claim."""
+    counts = {v: sum(f.verdict == v for f in findings)
+              for v in (HOLDS, FAILS, UNDECIDED, UNMEASURED)}
+    if counts[HOLDS] >= claim.needed:
+        return HOLDS
+    if len(findings) - counts[FAILS] < claim.needed:
+        return FAILS
+    return UNMEASURED if counts[UNMEASURED] == len(findings) else UNDECIDED
+
+
+# ---- Parts that compare samples
+
+
+def _usable(evidence: Evidence, task: str, method: str) -> Sample | None:
+    sample = evidence.samples.get((task, method))
+    return None if sample is None or sample.shortened else sample
+
+
+def _rivals(evidence: Evidence, task: str) -> dict[str, Sample]:
+    found = {m: _usable(evidence, task, m) for m in RIVALS + MORE_RIVALS}
+    return {m: s for m, s in found.items() if s is not None}
+
+
+def _compare(part: str, d: Difference, x: Moments, y: Moments, rival: str, verdict: str
+             ) -> Finding:
+    return Finding(part, verdict, f"{number(d.mean, '+')} {interval(d.interval, '+')} against "
+                   f"{METHODS[rival]}, p = {p_value(d.p)}", (x.n, y.n))
+
+
+def _more_seeds(finding: Finding, d: Difference, x: Moments, y: Moments) -> Finding:
+    """Says, of an undecided comparison, how many seeds the difference seen would take."""
+    if finding.verdict != UNDECIDED or d.p < 1 - CONFIDENCE:
+        return finding
+    needed = seeds_needed(x, y)
+    return replace(finding, measured=f"{finding.measured}; would take "
+                   + (f"{needed} seeds" if needed else "over 1000 seeds"))
+
+
+def _unmeasured(part: str, what: str) -> Finding:
+    return Finding(part, UNMEASURED, f"no whole runs of {what}")
+
+
+def _above(rival: str) -> Callable[[Evidence, str], Finding]:
+    def judge(evidence: Evidence, task: str) -> Finding:
+        ours, other = (_usable(evidence, task, m) for m in (OURS, rival))
+        if ours is None or other is None:
+            return _unmeasured(task, METHODS[OURS if ours is None else rival])
+        d = welch(ours.moments, other.moments)
+        verdict = HOLDS if d.above else FAILS if d.below else UNDECIDED
+        x, y = ours.moments, other.moments
+        return _more_seeds(_compare(task, d, x, y, rival, verdict), d, x, y)
+    return judge
+
+
+def _first(quantity: Callable[[Sample], Moments]) -> Callable[[Evidence, str], Finding]:
+    def judge(evidence: Evidence, task: str) -> Finding:
+        ours, rivals = _usable(evidence, task, OURS), _rivals(evidence, task)
+        if ours is None or not rivals:
+            return _unmeasured(task, METHODS[OURS] if ours is None else "rivals")
+        x = quantity(ours)
+        differences = {m: welch(x, quantity(s)) for m, s in rivals.items()}
+        failed = [m for m, d in differences.items() if d.below]
+        if failed:
+            verdict, shown = FAILS, max(failed, key=lambda m: quantity(rivals[m]).mean)
+        else:
+            # What decides is the rival that is hardest to tell from a better one.
+            shown = max(differences, key=lambda m: _one_sided(differences[m]))
+            verdict = HOLDS if all(d.above for d in differences.values()) else UNDECIDED
+        d, y = differences[shown], quantity(rivals[shown])
+        finding = _more_seeds(_compare(task, d, x, y, shown, verdict), d, x, y)
+        finding = replace(finding, leads=all(d.mean > 0 for d in differences.values()))
+        return finding if failed else _with_missing(finding, rivals)
+    return judge
+
+
+def _with_missing(finding: Finding, rivals: Mapping[str, Sample]) -> Finding:
+    """Undecided as long as one of RIVALS is missing."""
+    missing = ", ".join(METHODS[m] for m in RIVALS if m not in rivals)
+    return finding if not missing else replace(
+        finding, verdict=UNDECIDED, measured=f"{finding.measured}; no runs of {missing}")
+
+
+def _one_sided(d: Difference) -> float:
+    """p of "not above"; 1 where there is none."""
+    return 1.0 if math.isnan(d.p) else d.p / 2 if d.mean > 0 else 1 - d.p / 2
+
+
+def _against_best(judge: Callable[[str, Sample, str, Sample], Finding]
+                  ) -> Callable[[Evidence, str], Finding]:
+    """A part about the rival with the highest mean."""
+    def whole(evidence: Evidence, task: str) -> Finding:
+        ours, rivals = _usable(evidence, task, OURS), _rivals(evidence, task)
+        if ours is None or not rivals:
+            return _unmeasured(task, METHODS[OURS] if ours is None else "rivals")
+        best = max(rivals, key=lambda m: rivals[m].moments.mean)
+        return _with_missing(judge(task, ours, best, rivals[best]), rivals)
+    return whole
+
+
+def _smaller_spread(task: str, ours: Sample, rival: str, best: Sample) -> Finding:
+    x, y = ours.moments, best.moments
+    text = f"std {number(x.std)} against {number(y.std)} of {METHODS[rival]}"
+    if min(x.n, y.n) < 3 or x.std + y.std == 0:
+        return Finding(task, UNDECIDED, text, (x.n, y.n))
+    p = float(stats.levene(ours.final, best.final, center="median").pvalue)
+    verdict = UNDECIDED if p >= 1 - CONFIDENCE else HOLDS if x.std < y.std else FAILS
+    return Finding(task, verdict, f"{text}, p = {p_value(p)}", (x.n, y.n))
+
+
+def _comparable(task: str, ours: Sample, rival: str, best: Sample) -> Finding:
+    x, y = ours.moments, best.moments
+    d, margin = welch(x, y), MARGIN * abs(y.mean)
+    low = d.interval[0]
+    verdict = FAILS if d.below else HOLDS if low >= -margin else UNDECIDED
+    finding = _compare(task, d, x, y, rival, verdict)
+    return replace(finding, measured=f"{finding.measured}, margin {number(margin)}")
+
+
+# ---- Parts that look at Option2Vec alone
+
+
+def _converged(evidence: Evidence, task: str) -> Finding:
+    ours = _usable(evidence, task, OURS)
+    if ours is None:
+        return _unmeasured(task, METHODS[OURS])
+    d, margin = one_sample(ours.gain), FLAT * abs(ours.progress)
+    low, high = d.interval
+    verdict = UNDECIDED
+    if -margin <= low and high <= margin:
+        verdict = HOLDS
+    elif low > margin or high < -margin:
+        verdict = FAILS
+    return Finding(task, verdict, f"{number(d.mean, '+')} {interval(d.interval, '+')} in the last "
+                   f"tenth, margin {number(margin)}", (ours.gain.n,))
+
+
+def _growing(evidence: Evidence, task: str) -> Finding:
+    ours = _usable(evidence, task, OURS)
+    if ours is None or not ours.durations.size:
+        return Finding(task, UNMEASURED, "no records of option durations")
+    early, late = ours.durations
+    d = one_sample(Moments.of(late - early))
+    verdict = HOLDS if d.above else FAILS if d.below else UNDECIDED
+    return Finding(task, verdict, f"{number(early.mean())} to {number(late.mean())} steps: "
+                   f"{number(d.mean, '+')} {interval(d.interval, '+')}, p = {p_value(d.p)}",
+                   (len(early),))
+
+
+# ---- Claims that are not about returns
+
+
+def parameter_counts(params: Rows, fidelity: str) -> dict[str, int]:
+    """All parameters on HalfCheetah-v2 (S = 17, A = 6): Option2Vec's, and those of the option
+    network at its two widths."""
+    rows = [r for r in params if r["task"] == "HalfCheetah-v2" and r["fidelity"] == fidelity]
+    return {OURS if r["method"] == OURS else f"width {r['width']}": r["counted"]
+            for r in rows if r["method"] in (OURS, "dac_ppo")}
+
+
+AUTHORS_PARAMETERS = {OURS: 30598, "width 64": 55809, "width 128": 193473}  # spec 2.3, 2.6
+
+
+def _parameters(width: int) -> Callable[[Evidence], Sequence[Finding]]:
+    def judge(evidence: Evidence) -> Sequence[Finding]:
+        ours, other = (evidence.parameters.get(name) for name in (OURS, f"width {width}"))
+        if ours is None or other is None:
+            return [Finding("S = 17, A = 6", UNMEASURED, "no results/params.csv")]
+        verdict = HOLDS if round(ours / other, 3) == SHARE else FAILS
+        return [Finding("S = 17, A = 6", verdict, f"{ours} / {other} = {100 * ours / other:.1f} %")]
+    return judge
+
+
+def _gradients(evidence: Evidence) -> Sequence[Finding]:
+    other = {"paper": "released", "released": "paper"}.get(evidence.source)
+    errors = [r["largest_error"] for r in evidence.gradcheck if other not in r["name"].split()]
+    if not errors:
+        return [Finding("all checks", UNMEASURED, "no table of gradient checks")]
+    good = sum(e < GRADIENT_BOUND for e in errors)
+    return [Finding("all checks", HOLDS if good == len(errors) else FAILS,
+                    f"{good} of {len(errors)} below 1e-06, largest error {max(errors):.2g}")]
+
+
+def _theory(evidence: Evidence) -> Sequence[Finding]:
+    findings = []
+    for statement in ("Proposition 3.1", "Proposition 3.2", "Theorem 3.3", "Theorem 3.4"):
+        rows = [r for r in evidence.theory if statement.split()[1] in r["name"]]
+        if not rows:
+            findings.append(Finding(statement, UNMEASURED, "no table of statements"))
+            continue
+        good = sum(r["verdict"] == "PASS" for r in rows)
+        false = sum(": false" in r["name"] for r in rows)
+        findings.append(Finding(
+            statement, HOLDS if good == len(rows) else FAILS,
+            f"{good} of {len(rows)} checks come out as said; {false} of them show a reading false"))
+    return findings
+
+
+def primary_share(effects: np.ndarray) -> np.ndarray:
+    """Share of all effects (..., D, A) that each dimension has on its primary action."""
+    size = np.abs(effects)
+    return size.max(axis=-1).sum(axis=-1) / size.sum(axis=(-2, -1))
+
+
+def _interpretable(evidence: Evidence) -> Sequence[Finding]:
+    if not evidence.effects:
+        return [Finding("embedding", UNMEASURED, "needs the output of `option2vec interpret`")]
+    rng = np.random.default_rng(STREAM)
+    shares, rotated = [], []
+    for effects in evidence.effects.values():
+        rotations = stats.ortho_group.rvs(len(effects), size=ROTATIONS, random_state=rng)
+        shares.append(primary_share(effects))
+        rotated.append(primary_share(rotations @ effects))
+    share, others = np.mean(shares), np.mean(rotated, axis=0)
+    p = (1 + int((others >= share).sum())) / (1 + ROTATIONS)
+    return [Finding("embedding", HOLDS if p < 1 - CONFIDENCE else UNDECIDED,
+                    f"{100 * share:.0f} % of the effect on primary actions, after rotation "
+                    f"{100 * others.mean():.0f} %, p = {p_value(p)}", (len(shares),))]
+
+
+# ---- The ledger
+
+
+def _each(tasks: Sequence[str], judge: Callable[[Evidence, str], Finding]
+          ) -> Callable[[Evidence], Sequence[Finding]]:
+    return lambda evidence: [judge(evidence, task) for task in tasks]
+
+
+FIRST = ("Option2Vec's mean is above that of every rival with p < 0.05 each (Welch, two-sided); it "
+         "does not hold where a rival's is above Option2Vec's with p < 0.05")
+
+CLAIMS = (
+    Claim("Q1", "Option2Vec is above DAC-OneStep on all ten tasks",
+          "Return at 1M steps; above: larger mean and p < 0.05 (Welch, two-sided); it does not "
+          "hold on a task where it is below with p < 0.05.",
+          10, _each(TASKS, _above("dac_onestep"))),
+    Claim("Q2", "Best on the four tasks without termination", f"Return at 1M steps. {FIRST}.",
+          4, _each(INFINITE, _first(lambda s: s.moments))),
+    Claim("Q2", "Smaller variance on these four",
+          "Standard deviation over seeds of the return at 1M steps, against the rival with the "
+          "highest mean: smaller (or, does not hold, larger) with p < 0.05 (Brown-Forsythe).",
+          4, _each(INFINITE, _against_best(_smaller_spread))),
+    Claim("Q2", "Faster convergence on these four",
+          "Faster: first in the mean return over steps 0 to 1M, the area below the learning curve. "
+          f"{FIRST}. Of the authors' logs the deviation of that area is an upper bound, the mean "
+          "one of the points.",
+          4, _each(INFINITE, _first(lambda s: s.area))),
+    Claim("Q2", "Comparable on the six tasks with termination",
+          "Return at 1M steps against the rival with the highest mean: comparable when not below "
+          "with p < 0.05 and the 95 % interval of the difference reaches no lower than "
+          f"{100 * MARGIN:.0f} % of the rival's mean below it; it does not hold when below with "
+          "p < 0.05.",
+          6, _each(FINITE, _against_best(_comparable))),
+    Claim("Q3", "First on five of the six transfer pairs",
+          f"Return at the end of the second task, 2M steps. {FIRST}.",
+          5, _each(tuple(PAIRS), _first(lambda s: s.moments))),
+    Claim("", "15.8 % of the parameters of the option network, at DAC's own width 64",
+          "All parameters, used or not, S = 17, A = 6, K = 4, over those of the network of DAC+PPO "
+          "with hidden layers of 64, which the paper says are unchanged; rounds to 15.8 %.",
+          1, _parameters(64)),
+    Claim("", "15.8 % of the parameters of the option network, at width 128",
+          "The same with hidden layers of 128, as in the authors' later scripts.",
+          1, _parameters(128)),
+    Claim("", "Gradients are those of the losses",
+          "Relative error of analytic against numeric gradients below 1e-6 in every check.",
+          1, _gradients),
+    Claim("", "Propositions 3.1 and 3.2, Theorems 3.3 and 3.4, in the sense that is true",
+          "Every check of `make theory` on a statement comes out as said: its gap is within "
+          "tolerance or, of a reading that is marked false, beyond it. Which readings are false is "
+          "in the table of the theory.", 4, _theory),
+    Claim("", "Option2Vec has converged after 1M steps, on all ten tasks",
+          "Mean return over the last tenth of the steps less that over the tenth before: the 95 % "
+          f"interval (t) lies within {100 * FLAT:.0f} % of all progress, from the first value to "
+          "the last tenth; it does not hold when the interval lies outside. Of the authors' logs "
+          "the deviation is an upper bound.",
+          10, _each(TASKS, _converged)),
+    Claim("Q4", "Embeddings are interpretable",
+          "Share of the effect of the embedding's dimensions on the mean action that falls on each "
+          "dimension's primary action, mean over runs: larger than in "
+          f"{100 * CONFIDENCE:.0f} % of random rotations of the embedding space; undecided "
+          "otherwise.", 1, _interpretable),
+    Claim("Q5", "Option durations grow, on all ten tasks",
+          "Mean duration of an option (steps by executions, all options together) in the last "
+          "tenth of the steps less that in the first: positive with p < 0.05 (t, paired by run); "
+          "it does not hold on a task where it is negative with p < 0.05.",
+          10, _each(TASKS, _growing)),
+)

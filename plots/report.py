@@ -1,0 +1,423 @@
+"""Writes results/REPORT.md and results/report.html, from records and reference numbers only."""
+
+import argparse
+import math
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from plots import (fig_cost, fig_embedding, fig_learning_curves, fig_options, fig_parameters,
+                   fig_transfer)
+from plots.claims import (AUTHORS_PARAMETERS, CLAIMS, FAILS, GRADIENT_BOUND, HOLDS, OURS, UNDECIDED,
+                          UNMEASURED, Claim, Evidence, Finding, parameter_counts, verdict_of)
+from plots.records import (FIDELITIES, METHODS, PAIRS, SEEDS, TASKS, Cell, DamagedFile,
+                           Key, Rows, load_cells)
+from plots.samples import Sample, Samples, author_samples, our_samples
+from plots.statistics import Moments, bootstrap, improvement, iqm, mean_improvement, welch
+from plots.style import FOLDER, RESULTS, Drawing, inline_svg, save
+from plots.tables import COUNTERS, read_bench, read_interpretations, read_rows, read_switches
+from plots.text import (Block, Heading, Items, Paragraph, Picture, Table, interval, moments, number,
+                        p_value, ranges, to_html, to_markdown)
+
+TITLE = "Option2Vec: what the reproduction found"
+SOURCES = FIDELITIES + ("authors",)
+ALL_TASKS = TASKS + tuple(PAIRS)
+SINGLE_NOTE = (
+    "The authors' scripts pick PPO's logs by a name that PPOC's match, too, so that the curve of "
+    "PPO in their figures may be the mean of both; here the two are apart. Their logs have no "
+    "DAC-OneStep, and IOPG on four tasks.")
+TRANSFER_NOTE = (
+    "OC is the option-critic with four workers; the curve of that name in the authors' figure is "
+    "IOPG's. The authors' Option2Vec has embeddings of 20 or 30 dimensions on these pairs. Values "
+    "are those at the end of the second task.")
+
+
+def build(results: Path, experiments: Sequence[str] | None = None
+          ) -> tuple[list[Block], list[Drawing]]:
+    """The report's blocks, and the figures among them."""
+    cells = load_cells(results, experiments)
+    sources = {f: our_samples(cells, f) for f in FIDELITIES}
+    sources["authors"] = author_samples(results / "reference")
+    params, gradcheck, theory = (read_rows(results, n) for n in ("params", "gradcheck", "theory"))
+    effects = {path: effects for path, (_, effects) in read_interpretations(results).items()}
+    evidence = [Evidence(f, sources[f], parameter_counts(params, f), gradcheck, theory,
+                         {p: e for p, e in effects.items() if p.parts[-4] == f})
+                for f in FIDELITIES]
+    evidence.append(Evidence("authors", sources["authors"], AUTHORS_PARAMETERS))
+
+    drawings: list[Drawing] = []
+
+    def drawn(module) -> list[Block]:
+        new = module.draw(results, experiments)
+        drawings.extend(d for d in new if d.figure is not None)
+        return [_picture(d) for d in new]
+
+    return [
+        *_introduction(cells),
+        Heading("Claims"), *_claims(evidence),
+        Heading("Single tasks"), Paragraph(SINGLE_NOTE), *_comparison(TASKS, sources),
+        *drawn(fig_learning_curves),
+        Heading("Transfer"), Paragraph(TRANSFER_NOTE), *_comparison(tuple(PAIRS), sources),
+        *drawn(fig_transfer),
+        Heading("Options"), *drawn(fig_options), *drawn(fig_embedding),
+        Heading("Parameters"), *_parameters(params), *drawn(fig_parameters),
+        Heading("Cost"), *_cost(read_bench(results)), *drawn(fig_cost),
+        Heading("Gradients and physics"), *_checks(gradcheck, read_rows(results, "parity")),
+        Heading("Theory"), *_theory(theory),
+        Heading("Deviations"), *_deviations(read_switches(results), cells),
+        Heading("Missing runs"), *_missing(cells),
+    ], drawings
+
+
+def _picture(drawing: Drawing) -> Block:
+    if drawing.figure is None:
+        return Paragraph(drawing.caption)
+    return Picture(drawing.name, drawing.caption, inline_svg(drawing))
+
+
+def _introduction(cells: Mapping[Key, Cell]) -> list[Block]:
+    runs = [run for key, cell in cells.items() if not key.variant for run in cell.runs]
+    grid = len(FIDELITIES) * len(ALL_TASKS) * len(METHODS) * len(SEEDS)
+    found = sum(run.seed in SEEDS for run in runs)
+    partial = "the whole grid" if found == grid else "a partial grid: see Missing runs"
+    folders = ", ".join(f"`{name}`" for name in sorted({run.path.parts[-5] for run in runs}))
+    revisions = [f"{_name(key)}: revision {cell.runs[0].revision} is used, {cell.older} runs of "
+                 "older revisions are left out" for key, cell in cells.items() if cell.older]
+    blocks: list[Block] = [
+        Paragraph(f"Made from the records of {found} of the grid's {grid} runs ({partial}; folders "
+                  f"of `results/`: {folders or 'none'}), and from the authors' learning curves in "
+                  "`results/reference/`. `paper` is a method as it is written, `released` as the "
+                  "authors' code computes it; the authors' curves belong beside `released`."),
+        Paragraph("A return is the mean of the last 20 training episodes at one million steps, on "
+                  "transfer pairs at two. ± is the standard deviation over seeds with divisor n, "
+                  "as in the authors' tables, and n is in parentheses. A run that diverged has no "
+                  "return; it is counted in the remarks. IQM is the mean of the "
+                  "middle half of the seeds. Brackets are 95 % intervals: of differences by "
+                  "Welch's t, of IQM and of the probability of improvement by a bootstrap of 2000 "
+                  "resamples, stratified by task and method, with a fixed stream. p is Welch's, "
+                  "two-sided, not corrected for the number of tests."),
+    ]
+    if revisions:
+        blocks += [Paragraph("**Records of several revisions of a method's code:**"),
+                   Items(revisions)]
+    return blocks
+
+
+# ---- Claims
+
+
+def _claims(evidence: Sequence[Evidence]) -> list[Block]:
+    judged = [(claim, [claim.judge(e) for e in evidence]) for claim in CLAIMS]
+    tests = sum(bool(f.n) for _, columns in judged for findings in columns for f in findings)
+    blocks: list[Block] = [
+        Paragraph("Definitions, fixed in `plots/claims.py` before the verdicts. The verdict on a "
+                  f"claim, and on each of its parts, is \"{HOLDS}\", \"{FAILS}\", \"{UNDECIDED}\" "
+                  f"at so many seeds, or \"{UNMEASURED}\". A claim about several tasks holds when "
+                  "it holds on as many as it names; it does not hold when that has become "
+                  "impossible. Rivals are DAC+PPO, AHP+PPO, PPOC, OC and PPO, which have to be "
+                  "there for a verdict \"holds\" or a comparison with the best of them, and "
+                  "DAC-OneStep and IOPG where they have runs. Shortened runs decide nothing."),
+        Items([f"**{_title(claim)}**: {claim.definition}" for claim in CLAIMS]),
+        Paragraph(f"Multiplicity: {tests} parts are tests, each at 5 % and uncorrected. \"Holds\" "
+                  "needs every one of several tests, which makes it harder than 5 %; \"does not "
+                  "hold\" needs one shortfall among them, so that some would appear by chance "
+                  "where methods are equal, though rarely where the claim is true. The authors' "
+                  "Option2Vec runs share initial weights and environment seeds on all single tasks "
+                  "but HalfCheetah and Swimmer: their p are too small."),
+        Table(["claim", *(_source(e.source) for e in evidence)],
+              [[_title(claim),
+                *(_summary(verdict_of(claim, findings), findings) for findings in columns)]
+               for claim, columns in judged]),
+    ]
+    for claim, columns in judged:
+        if max(map(len, columns)) == 1:
+            continue  # all of it is in the ledger
+        parts: dict[str, list[str]] = {}
+        for place, findings in enumerate(columns):
+            for finding in findings:
+                parts.setdefault(finding.part, ["-"] * len(columns))[place] = _finding(finding)
+        blocks += [Heading(_title(claim), 3),
+                   Table(["part", *(_source(e.source) for e in evidence)],
+                         [[part, *texts] for part, texts in parts.items()])]
+    return blocks
+
+
+def _title(claim: Claim) -> str:
+    return f"{claim.question}: {claim.text}" if claim.question else claim.text
+
+
+def _source(source: str) -> str:
+    return "authors' logs" if source == "authors" else f"`{source}`"
+
+
+def _summary(verdict: str, findings: Sequence[Finding]) -> str:
+    seeds = [n for f in findings for n in f.n]
+    at = f" at n = {'-'.join(map(str, sorted({min(seeds), max(seeds)})))}" if seeds else ""
+    reasons = list(dict.fromkeys(f.measured for f in findings))
+    if len(reasons) == 1 or verdict == UNMEASURED:
+        return f"{verdict}{at}: {'; '.join(reasons)}"
+    counts = {text: sum(f.verdict == v for f in findings) for v, text in (
+        (HOLDS, "holds on"), (FAILS, "does not hold on"), (UNDECIDED, "undecided on"),
+        (UNMEASURED, "not measured on"))}
+    text = f"{verdict}{at}: " + ", ".join(f"{text} {n}" for text, n in counts.items() if n)
+    leads = [f.leads for f in findings if f.leads is not None]
+    return text + (f"; highest mean on {sum(leads)} of {len(leads)}" if leads else "")
+
+
+def _finding(finding: Finding) -> str:
+    seeds = f" (n = {', '.join(map(str, finding.n))})" if finding.n else ""
+    lead = {True: "highest mean, ", False: "not the highest mean, ", None: ""}[finding.leads]
+    return f"{finding.verdict}: {lead}{finding.measured}{seeds}"
+
+
+# ---- Returns
+
+
+def _comparison(tasks: Sequence[str], sources: Mapping[str, Samples]) -> list[Block]:
+    blocks: list[Block] = []
+    for source in SOURCES:
+        samples = sources[source]
+        rows = [[task, *(moments(_moments(samples.get((task, m)))) for m in METHODS)]
+                for task in tasks]
+        blocks += [Heading(f"Returns, {_source(source)}", 3),
+                   Table(["task", *METHODS.values()], rows)]
+    blocks += [Heading("Probability of improvement of Option2Vec, mean over tasks", 3),
+               Table(["over", *map(_source, SOURCES)],
+                     [[METHODS[m], *(_mean_improvement(tasks, m, sources[s]) for s in SOURCES)]
+                      for m in METHODS if m != OURS])]
+    for fidelity in FIDELITIES:
+        rows = [_row(task, m, sources[fidelity], sources["authors"])
+                for task in tasks for m in METHODS if (task, m) in sources[fidelity]]
+        blocks.append(Heading(f"Ours in detail, {_source(fidelity)}", 3))
+        if not rows:
+            blocks.append(Paragraph("No runs yet."))
+            continue
+        header = ["task", "method", "ours", "IQM [95 %]", "authors", "p, ours = authors",
+                  "P(Option2Vec > method) [95 %]", "Option2Vec - method [95 %]", "p", "remarks"]
+        if tasks[0] in PAIRS:
+            header += ["first task, ours", "first task, authors"]
+        blocks.append(Table(header, rows))
+    return blocks
+
+
+def _moments(sample: Sample | None) -> Moments | None:
+    return None if sample is None else sample.moments
+
+
+def _row(task: str, method: str, ours: Samples, authors: Samples) -> list[str]:
+    sample, published = ours[task, method], authors.get((task, method))
+    theirs = _moments(published)
+    if published is not None and sample.shortened:
+        theirs = published.curve.at(sample.step)
+    best = ours.get((task, OURS))
+    beside = ["-"] * 3
+    if best is not None and method != OURS and best.step == sample.step:
+        d = welch(best.moments, sample.moments)
+        beside = [_with_interval(improvement(best.final, sample.final),
+                                 bootstrap(improvement, best.final, sample.final)),
+                  f"{number(d.mean, '+')} {interval(d.interval, '+')}", p_value(d.p)]
+    remarks = [f"at {sample.step} steps"] if sample.shortened else []
+    remarks += [f"{sample.diverged} diverged"] if sample.diverged else []
+    remarks += [f"{sample.older} of older revisions left out"] if sample.older else []
+    row = [task, METHODS[method], moments(sample.moments),
+           _with_interval(iqm(sample.final), bootstrap(iqm, sample.final)), moments(theirs),
+           p_value(welch(sample.moments, theirs).p) if theirs else "-", *beside,
+           ", ".join(remarks)]
+    if task in PAIRS:
+        row += [moments(Moments.of(s.first)) if s is not None and len(s.first) else "-"
+                for s in (sample, published)]
+    return row
+
+
+def _mean_improvement(tasks: Sequence[str], method: str, samples: Samples) -> str:
+    both = [(samples[t, OURS], samples[t, method]) for t in tasks
+            if (t, OURS) in samples and (t, method) in samples]
+    finals = [s.final for pair in both for s in pair]
+    if not finals:
+        return "-"
+    text = _with_interval(mean_improvement(*finals), bootstrap(mean_improvement, *finals))
+    return f"{text} ({len(both)} of {len(tasks)} tasks)"
+
+
+def _with_interval(value: float | np.ndarray, i: tuple[float, float]) -> str:
+    return f"{number(float(value))} {interval(i)}".removesuffix(" -")
+
+
+# ---- Tables of checks
+
+
+def _parameters(params: Rows) -> list[Block]:
+    if not params:
+        return [Paragraph("No results/params.csv yet (`make report` writes it).")]
+    theirs = {("option2vec", 64): 30598, ("dac_onestep", 64): 57321, ("dac_onestep", 128): 195049,
+              ("ppo", 64): 11085, ("ppo", 128): 38541}  # spec 2.2 to 2.6
+    theirs |= {(m, h): AUTHORS_PARAMETERS[f"width {h}"] for h in (64, 128)
+               for m in ("dac_ppo", "ahp_ppo", "iopg", "ppoc", "oc")}
+    rows = []
+    for r in params:
+        if r["task"] != "HalfCheetah-v2":
+            continue
+        shares = [p["share"] for p in params if not math.isnan(p["share"]) and all(
+            p[name] == r[name] for name in ("method", "fidelity", "width"))]
+        rows.append([METHODS[r["method"]], r["fidelity"], str(r["width"]), str(r["counted"]),
+                     str(theirs.get((r["method"], r["width"]), "-"))
+                     if r["fidelity"] == "released" else "-", str(r["used"]),
+                     f"{100 * r['share']:.1f} %" if shares else "-",
+                     f"{100 * min(shares):.1f} to {100 * max(shares):.1f} %" if shares else "-"])
+    return [Paragraph("HalfCheetah-v2: S = 17, A = 6, K = 4. Width is that of both hidden layers. "
+                      "Used: parameters that some loss can reach. Share: Option2Vec's count over "
+                      "the line's."),
+            Table(["method", "fidelity", "width", "parameters", "authors' code", "used", "share",
+                   "share, all tasks"], rows)]
+
+
+def _cost(costs: Rows) -> list[Block]:
+    if not costs:
+        return [Paragraph("No results/bench.json yet (`make bench`).")]
+    rows = [[r["task"], METHODS[r["method"]], r["fidelity"],
+             *(number(r[name]) for name in COUNTERS)] for r in costs]
+    return [Paragraph("CPU microseconds an environment step, the least of five measurements, on "
+                      "one machine; the bound is what no implementation avoids. The authors "
+                      "published no such numbers."),
+            Table(["task", "method", "fidelity", *(_unit(name) for name in COUNTERS)], rows)]
+
+
+def _unit(counter: str) -> str:
+    name = counter.removesuffix("_us")
+    return name.replace("_", " ") + (" [µs]" if name != counter else "")
+
+
+def _checks(gradcheck: Rows, parity: Rows) -> list[Block]:
+    groups: dict[str, list[float]] = {}
+    for row in gradcheck:
+        method = row["name"].split()[0]
+        groups.setdefault(METHODS.get(method, "layers, densities, losses"), []).append(
+            row["largest_error"])
+    blocks: list[Block] = [Paragraph("No results/gradcheck.csv yet (`make gradcheck`).")]
+    if groups:
+        blocks = [Paragraph("Analytic against numeric gradients in double precision, error "
+                            f"relative to the gradient, bound {GRADIENT_BOUND:.0e}."),
+                  Table(["of", "checks", "below the bound", "largest error"],
+                        [[name, str(len(e)), str(sum(x < GRADIENT_BOUND for x in e)),
+                          f"{max(e):.2g}"] for name, e in groups.items()])]
+    if not parity:
+        return [*blocks, Paragraph("No results/parity.csv yet (`make parity`).")]
+    kinds = dict.fromkeys(row["check"] for row in parity)
+    lines = []
+    for kind in kinds:
+        rows = [row for row in parity if row["check"] == kind]
+        worst = max(rows, key=lambda r: r["deviation"] / r["bound"])
+        lines.append([kind, str(len(rows)), str(sum(r["deviation"] <= r["bound"] for r in rows)),
+                      f"{worst['deviation']:.2g} of {worst['bound']:.2g} ({worst['name']})"])
+    return [*blocks, Paragraph("Physics, observations and rewards against the reference numbers."),
+            Table(["check", "files", "within the bound", "worst"], lines)]
+
+
+def _theory(theory: Rows) -> list[Block]:
+    if not theory:
+        return [Paragraph("No results/theory.csv yet (`make theory`).")]
+    return [Paragraph("The paper's statements on small random decision processes. A reading of a "
+                      "statement that is false says so, and its gap has to be large."),
+            Table(["statement", "gap", "has to be", "check", "compared"],
+                  [[r["name"], f"{r['gap']:.2g}", f"{r['relation']} {r['tolerance']:g}",
+                    r["verdict"], r["compared"]] for r in theory])]
+
+
+# ---- Deviations, missing runs
+
+
+def _deviations(switches: Rows, cells: Mapping[Key, Cell]) -> list[Block]:
+    if not switches:
+        return [Paragraph("No results/switches.txt yet (`make report` writes it).")]
+    rows = []
+    for s in switches:
+        meanings = s["effect"].split(" | ")  # of paper, released, further values; or of the switch
+        paper, released, *others = meanings if len(meanings) > 1 else (
+            f"{s['paper']} ({meanings[0]})", s["released"])
+        rows.append([s["switch"], s["methods"].replace(",", ", "), paper, released,
+                     "; ".join(others) or "-",
+                     *(_ran(s["switch"], f, cells) for f in FIDELITIES),
+                     "; ".join(_effects(s["switch"], cells)) or "not measured"])
+    return [Paragraph("Every difference between the paper and the released code is a switch. Runs: "
+                      "the values in the records, with their number. Effect: return with the "
+                      "switch turned less that without, other switches as the fidelity has them."),
+            Table(["switch", "methods", "the paper", "the released code", "other values",
+                   "our `paper` runs", "our `released` runs", "measured effect"], rows)]
+
+
+def _ran(switch: str, fidelity: str, cells: Mapping[Key, Cell]) -> str:
+    counts: dict[str, int] = {}
+    for key, cell in cells.items():
+        for run in cell.runs if (key.fidelity, key.variant) == (fidelity, "") else ():
+            if f"switches.{switch}" in run.settings:
+                value = str(run.settings[f"switches.{switch}"])
+                counts[value] = counts.get(value, 0) + 1
+    return ", ".join(f"{value} ({n})" for value, n in sorted(counts.items())) or "-"
+
+
+def _effects(switch: str, cells: Mapping[Key, Cell]) -> list[str]:
+    texts = []
+    for key in cells:
+        name, _, value = key.variant.partition("=")
+        if name != switch:
+            continue
+        turned = our_samples(cells, key.fidelity, key.variant).get((key.task, key.algorithm))
+        base = our_samples(cells, key.fidelity).get((key.task, key.algorithm))
+        if turned is not None and base is not None and turned.step == base.step:
+            d = welch(turned.moments, base.moments)
+            texts.append(f"{key.fidelity} with {value}, {key.task}, {METHODS[key.algorithm]}: "
+                         f"{number(d.mean, '+')} {interval(d.interval, '+')}, p = {p_value(d.p)} "
+                         f"(n = {turned.moments.n}, {base.moments.n})")
+    return texts
+
+
+def _missing(cells: Mapping[Key, Cell]) -> list[Block]:
+    rows = [[task, *(_missing_seeds(task, f, cells) for f in FIDELITIES)] for task in ALL_TASKS]
+    return [Paragraph(f"Of the whole grid: every method, seeds {ranges(SEEDS)}."),
+            Table(["task", *map(_source, FIDELITIES)], rows)]
+
+
+def _missing_seeds(task: str, fidelity: str, cells: Mapping[Key, Cell]) -> str:
+    lacking: dict[str, list[str]] = {}
+    for method in METHODS:
+        cell = cells.get(Key(fidelity, "", task, method))
+        seeds = set(SEEDS) - {run.seed for run in cell.runs if cell} if cell else set(SEEDS)
+        if seeds:
+            lacking.setdefault(ranges(sorted(seeds)), []).append(METHODS[method])
+    return "; ".join(f"seeds {seeds} of {'all methods' if len(m) == len(METHODS) else ', '.join(m)}"
+                     for seeds, m in lacking.items()) or "nothing"
+
+
+def _name(key: Key) -> str:
+    return "/".join(part for part in key if part)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--results", type=Path, default=RESULTS)
+    parser.add_argument("--experiment", action="append",
+                        help="folder of results/ (again for more; default: all but quick and ci)")
+    parser.add_argument("--out", type=Path, help="folder of the report and, then, of its figures "
+                        "(default: --results, and plots/ for the figures)")
+    options = parser.parse_args()
+    try:
+        blocks, drawings = build(options.results, options.experiment)
+    except (DamagedFile, FileNotFoundError) as error:
+        sys.exit(f"report: {error}")
+    folder = options.out or options.results
+    figures = options.out or FOLDER
+    folder.mkdir(parents=True, exist_ok=True)
+    for drawing in drawings:
+        save(drawing, figures)
+    link = Path(os.path.relpath(figures, folder)).as_posix()
+    for name, text in (("REPORT.md", to_markdown(TITLE, blocks, link)),
+                       ("report.html", to_html(TITLE, blocks))):
+        (folder / name).write_text(text, encoding="utf-8")
+        print(folder / name)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,130 @@
+"""Statistics over seeds. A sample is an array with one value a run."""
+
+import bisect
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+CONFIDENCE = 0.95
+POWER = 0.8  # of seeds_needed
+RESAMPLES = 2000
+STREAM = 2021  # seed of every bootstrap, so that an interval depends on its data only
+
+Interval = tuple[float, float]
+UNKNOWN: Interval = (math.nan, math.nan)
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Mean and standard deviation (divisor n, as in the authors' tables) of n values."""
+    mean: float
+    std: float
+    n: int
+
+    @staticmethod
+    def of(x: Sequence[float] | np.ndarray) -> "Moments":
+        return Moments(float(np.mean(x)), float(np.std(x)), len(x))
+
+    @property
+    def squared_error(self) -> float:
+        """Estimated variance of the mean; infinite for one value."""
+        return self.std**2 / (self.n - 1) if self.n > 1 else math.inf
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Mean of x minus mean of y, its interval and the two-sided p of Welch's test."""
+    mean: float
+    interval: Interval
+    p: float
+
+    @property
+    def above(self) -> bool:
+        """x is significantly larger."""
+        return self.p < 1 - CONFIDENCE and self.mean > 0
+
+    @property
+    def below(self) -> bool:
+        """x is significantly smaller."""
+        return self.p < 1 - CONFIDENCE and self.mean < 0
+
+
+def welch(x: Moments, y: Moments) -> Difference:
+    """Welch's t test. p and interval are NaN with a sample of one."""
+    mean = x.mean - y.mean
+    if min(x.n, y.n) < 2:
+        return Difference(mean, UNKNOWN, math.nan)
+    a, b = x.squared_error, y.squared_error
+    if a + b == 0:
+        return Difference(mean, (mean, mean), float(mean == 0))
+    dof = (a + b)**2 / (a**2 / (x.n - 1) + b**2 / (y.n - 1))  # Welch-Satterthwaite
+    error = math.sqrt(a + b)
+    half = float(stats.t.ppf((1 + CONFIDENCE) / 2, dof)) * error
+    return Difference(mean, (mean - half, mean + half),
+                      float(2 * stats.t.sf(abs(mean) / error, dof)))
+
+
+def one_sample(x: Moments) -> Difference:
+    """Student's t test of the mean against 0."""
+    if x.n < 2:
+        return Difference(x.mean, UNKNOWN, math.nan)
+    error = math.sqrt(x.squared_error)
+    if error == 0:
+        return Difference(x.mean, (x.mean, x.mean), float(x.mean == 0))
+    half = float(stats.t.ppf((1 + CONFIDENCE) / 2, x.n - 1)) * error
+    return Difference(x.mean, (x.mean - half, x.mean + half),
+                      float(2 * stats.t.sf(abs(x.mean) / error, x.n - 1)))
+
+
+def iqm(x: np.ndarray, axis: int = -1) -> np.ndarray:
+    """Mean of the middle half: value i of n sorted ones fills [i, i + 1), and [n/4, 3n/4) counts.
+    The same as `option2vec summary`; a 25 % trimmed mean where 4 divides n."""
+    x = np.sort(np.moveaxis(np.asarray(x, dtype=float), axis, -1), axis=-1)
+    n = x.shape[-1]
+    edges = np.clip(np.arange(n + 1), n / 4, 3 * n / 4)
+    return x @ np.diff(edges) / (n / 2)
+
+
+def improvement(x: np.ndarray, y: np.ndarray, axis: int = -1) -> np.ndarray:
+    """Probability that a run of x beats one of y, ties counting half: Mann-Whitney's U / (n m)."""
+    x = np.moveaxis(np.asarray(x), axis, -1)[..., :, None]
+    y = np.moveaxis(np.asarray(y), axis, -1)[..., None, :]
+    return ((x > y) + 0.5 * (x == y)).mean(axis=(-2, -1))
+
+
+def bootstrap(statistic: Callable[..., np.ndarray], *samples: np.ndarray) -> Interval:
+    """Percentile interval of statistic(*samples, axis=-1); every sample is a stratum, resampled by
+    itself. NaN with a sample of one."""
+    if min(len(x) for x in samples) < 2:
+        return UNKNOWN
+    result = stats.bootstrap(samples, statistic, n_resamples=RESAMPLES, vectorized=True, axis=-1,
+                             confidence_level=CONFIDENCE, method="percentile",
+                             random_state=np.random.default_rng(STREAM))
+    return float(result.confidence_interval.low), float(result.confidence_interval.high)
+
+
+def mean_improvement(*samples: np.ndarray, axis: int = -1) -> np.ndarray:
+    """Mean over tasks of improvement; samples are x and y of the first task, of the second, ..."""
+    return np.mean([improvement(x, y, axis) for x, y in zip(samples[::2], samples[1::2])], axis=0)
+
+
+def seeds_needed(x: Moments, y: Moments, largest: int = 1000) -> int | None:
+    """Seeds a method at which Welch's test would find this difference with 80 % power, were means
+    and deviations the true ones. None for more than `largest` or where they are not known."""
+    if min(x.n, y.n) < 2 or x.mean == y.mean:
+        return None
+
+    def enough(n: int) -> bool:
+        a, b = x.squared_error * x.n / n, y.squared_error * y.n / n
+        if a + b == 0:
+            return True
+        dof = (n - 1) * (a + b)**2 / (a**2 + b**2)
+        critical = stats.t.ppf((1 + CONFIDENCE) / 2, dof)
+        return bool(stats.nct.sf(critical, dof, abs(x.mean - y.mean) / math.sqrt(a + b)) >= POWER)
+
+    with np.errstate(invalid="ignore"):  # scipy's nct raises the flag on the way to good values
+        n = 2 + bisect.bisect_left(range(2, largest + 1), True, key=enough)
+    return n if n <= largest else None

@@ -1,0 +1,156 @@
+"""How figures look: one colour, line style and marker a method, the same in every figure.
+
+Colours are those of Okabe and Ito, which the colour-blind tell apart; line styles and markers do
+without colour. Black and white are the page's ink and paper, so that report.html can turn them.
+"""
+
+import argparse
+import io
+import re
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("svg")
+import matplotlib.pyplot as plt  # noqa: E402
+from matplotlib.artist import Artist  # noqa: E402
+from matplotlib.figure import Figure  # noqa: E402
+from matplotlib.lines import Line2D  # noqa: E402
+
+from plots.records import METHODS, DamagedFile  # noqa: E402
+
+INK = "#1a1a1a"
+PAPER = "#ffffff"
+GREY = "#8c8c8c"  # the authors' curves
+FOLDER = Path(__file__).parent
+RESULTS = FOLDER.parent / "results"
+PNG_DPI = 110
+POINTS, MARKERS = 50, 6  # about, on a curve
+
+
+@dataclass(frozen=True)
+class Look:
+    """Line style and marker in matplotlib's terms."""
+    color: str
+    line: str | tuple[int, tuple[float, ...]]
+    marker: str
+
+
+LOOKS = {
+    "option2vec": Look("#d55e00", "-", "o"),
+    "dac_onestep": Look("#0072b2", (0, (6, 2)), "s"),
+    "dac_ppo": Look("#009e73", (0, (4, 1, 1, 1)), "^"),
+    "ahp_ppo": Look("#cc79a7", (0, (2, 1)), "v"),
+    "iopg": Look("#e69f00", (0, (1, 1)), "P"),
+    "ppoc": Look("#56b4e9", (0, (8, 2, 1, 2)), "D"),
+    "oc": Look("#999933", (0, (4, 1, 1, 1, 1, 1)), "X"),
+    "ppo": Look(INK, (0, (3, 1)), ">"),
+}
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure, the name of its files and its caption; without a figure, when there is nothing to
+    draw, the caption says what is missing."""
+    name: str
+    caption: str
+    figure: Figure | None = None
+
+
+def new_figure(width: float, height: float, rows: int, columns: int, **more) -> tuple[Figure, list]:
+    """width, height [inch] -> the figure and its axes by row, [row][column]."""
+    plt.rcdefaults()
+    plt.rcParams.update({
+        "font.family": "DejaVu Sans", "font.size": 8, "axes.titlesize": 8, "legend.fontsize": 8,
+        "text.color": INK, "axes.edgecolor": INK, "axes.labelcolor": INK, "xtick.color": INK,
+        "ytick.color": INK, "figure.facecolor": PAPER, "axes.facecolor": PAPER,
+        "savefig.facecolor": PAPER, "legend.frameon": False, "axes.spines.top": False,
+        "axes.spines.right": False, "lines.linewidth": 1.4, "lines.markersize": 4,
+        "axes.grid": True, "grid.color": GREY, "grid.alpha": 0.25, "grid.linewidth": 0.5,
+        "hatch.linewidth": 0.6, "svg.hashsalt": "option2vec", "svg.fonttype": "path",
+    })
+    figure, axes = plt.subplots(rows, columns, figsize=(width, height), squeeze=False,
+                                layout="constrained", **more)
+    return figure, [list(row) for row in axes]
+
+
+def line_of(method: str, points: int = 1) -> dict:
+    """Keywords of a method's line through so many points; markers of methods lie apart."""
+    look = LOOKS[method]
+    every = max(points // MARKERS, 1)
+    markevery = (every * (1 + list(METHODS).index(method)) // (1 + len(METHODS)), every)
+    return {"color": look.color, "linestyle": look.line, "marker": look.marker,
+            "markevery": markevery, "markeredgewidth": 0}
+
+
+def legend_above(figure: Figure, methods: Iterable[str], *more: tuple[Artist, str],
+                 ncols: int = 5) -> None:
+    """A legend above all panels: methods, in the order of their table, and `more`."""
+    known = [m for m in METHODS if m in methods]
+    handles = [Line2D([], [], **line_of(m)) for m in known] + [artist for artist, _ in more]
+    labels = [METHODS[m] for m in known] + [text for _, text in more]
+    lines = -(-len(handles) // ncols)
+    strip = (0.1 + 0.17 * lines) / figure.get_figheight()  # [inch] a line
+    figure.get_layout_engine().set(rect=(0, 0, 1, 1 - strip))
+    figure.legend(handles, labels, loc="upper center", ncols=ncols)
+
+
+def thin(x: np.ndarray) -> np.ndarray:
+    """x (..., R) with its last value and so many before that there are about POINTS."""
+    return x[..., ::-1][..., ::max(x.shape[-1] // POINTS, 1)][..., ::-1]
+
+
+@cache
+def svg_of(drawing: Drawing) -> str:
+    """The figure as SVG text, the same bytes every time."""
+    assert drawing.figure is not None
+    text = io.StringIO()
+    drawing.figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
+    # Coordinates to a hundredth of a point, which halves the file.
+    return re.sub(r' (?:d|x|y)="[^"]*"', lambda attribute: re.sub(
+        r"-?\d+\.\d{3,}", lambda x: f"{float(x[0]):.2f}", attribute[0]), text.getvalue())
+
+
+def inline_svg(drawing: Drawing) -> str:
+    """An <svg> element for a page: its ids begin with the figure's name, ink and paper are the
+    page's variables --ink and --paper, the size is the page's business."""
+    text = svg_of(drawing)
+    text = text[text.index("<svg"):]
+    text = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", text, count=1)
+    text = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1)
+    text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
+    text = re.sub(r'( id="|"#|url\(#)', rf"\g<1>{drawing.name}-", text)
+    return text.replace(INK, "var(--ink)").replace(PAPER, "var(--paper)").strip()
+
+
+def save(drawing: Drawing, folder: Path) -> None:
+    """Writes <folder>/<name>.svg and .png."""
+    assert drawing.figure is not None
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / f"{drawing.name}.svg").write_text(svg_of(drawing), encoding="utf-8")
+    drawing.figure.savefig(folder / f"{drawing.name}.png", dpi=PNG_DPI, metadata={"Software": None})
+
+
+def main(draw: Callable[[Path, Sequence[str] | None], list[Drawing]], summary: str) -> None:
+    """The program of a figure's script."""
+    parser = argparse.ArgumentParser(description=summary)
+    parser.add_argument("--results", type=Path, default=RESULTS)
+    parser.add_argument("--experiment", action="append",
+                        help="folder of results/ (again for more; default: all but quick and ci)")
+    parser.add_argument("--out", type=Path, default=FOLDER)
+    options = parser.parse_args()
+    try:
+        drawings = draw(options.results, options.experiment)
+    except (DamagedFile, FileNotFoundError) as error:
+        sys.exit(f"{parser.prog}: {error}")
+    for drawing in drawings:
+        if drawing.figure is None:
+            print(f"{drawing.name}: {drawing.caption}")
+            continue
+        save(drawing, options.out)
+        print(options.out / f"{drawing.name}.svg")

@@ -1,0 +1,91 @@
+"""Reads the tables of results/ that are not records; where a file is absent, there are no rows."""
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from plots.records import Columns, DamagedFile, Rows, finite, number_or_nan, read_table
+
+COLUMNS: dict[str, Columns] = {
+    "params": {  # option2vec params --csv
+        "task": str, "S": int, "A": int, "method": str, "fidelity": str, "width": int,
+        "counted": int, "used": int, "share": number_or_nan},
+    "gradcheck": {  # make gradcheck
+        "name": str, "entries": int, "largest_gradient": finite, "largest_error": finite},
+    "parity": {  # make parity
+        "check": str, "name": str, "deviation": finite, "bound": finite, "where": str,
+        "deviation_all_rows": finite},
+    "theory": {  # make theory
+        "name": str, "gap": finite, "relation": str, "tolerance": finite, "verdict": str,
+        "compared": str},
+}
+PARTS = ("physics_us", "inference_us", "learning_us")  # of an environment step
+COUNTERS = PARTS + ("total_us", "bound_us", "bound_products_us", "bound_adam_us", "MFLOP", "ratio")
+
+
+def read_rows(results: Path, name: str) -> Rows:
+    """Rows of results/<name>.csv, a key of COLUMNS."""
+    path = results / f"{name}.csv"
+    return read_table(path, COLUMNS[name]) if path.is_file() else []
+
+
+def read_bench(results: Path) -> Rows:
+    """Costs of an environment step from bench.json of `make bench`: task, method, fidelity and
+    COUNTERS, CPU microseconds and 1e6 floating-point operations a step."""
+    path = results / "bench.json"
+    if not path.is_file():
+        return []
+    try:
+        benchmarks = json.loads(path.read_text(encoding="utf-8"))["benchmarks"]
+    except json.JSONDecodeError as error:
+        raise DamagedFile(f"{path}:{error.lineno}: {error.msg}") from None
+    except (KeyError, TypeError):
+        raise DamagedFile(f"{path}:1: no list 'benchmarks'") from None
+    rows = []
+    for benchmark in benchmarks:
+        kind, *names = benchmark.get("name", "").split("/")
+        if kind != "step":
+            continue
+        try:
+            task, method, fidelity, _ = names
+            counters = {name: finite(benchmark[name]) for name in COUNTERS}
+        except (KeyError, ValueError) as error:
+            raise DamagedFile(f"{path}:1: {benchmark['name']}: {error}") from None
+        rows.append({"task": task, "method": method, "fidelity": fidelity} | counters)
+    return rows
+
+
+def read_switches(results: Path) -> Rows:
+    """Rows of results/switches.txt, as `option2vec list switches` prints them: columns are two
+    spaces apart."""
+    path = results / "switches.txt"
+    if not path.is_file():
+        return []
+    columns = ["switch", "paper", "released", "takes", "methods", "effect"]
+    rows = []
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        cells = re.split(r"  +", line.strip())
+        if len(cells) != len(columns) or (number == 1 and cells != columns):
+            raise DamagedFile(f"{path}:{number}: not the columns {', '.join(columns)}")
+        rows.append(dict(zip(columns, cells)))
+    return rows[1:]
+
+
+def read_interpretations(results: Path) -> Mapping[Path, tuple[np.ndarray, np.ndarray]]:
+    """Embedding matrices W_o (D, K) and effects (D, A) by file; format: plots/fig_embedding.py."""
+    found = {}
+    for path in sorted((results / "interpret").glob("*/*/*/seed-*.csv")):
+        with path.open(encoding="utf-8") as file:
+            header = file.readline().rstrip("\n").split(",")
+        K = sum(name.startswith("embedding_") for name in header)
+        A = sum(name.startswith("effect_") for name in header)
+        columns: Columns = ({"dimension": int} | {f"embedding_{k}": finite for k in range(K)}
+                            | {f"effect_{a}": finite for a in range(A)})
+        table = np.array([list(row.values()) for row in read_table(path, columns)], dtype=float)
+        if not len(table) or K == 0 or A == 0 or (table[:, 0] != np.arange(len(table))).any():
+            raise DamagedFile(f"{path}:1: not one row a dimension 0, 1, ... with both quantities")
+        found[path] = (table[:, 1:1 + K], table[:, 1 + K:])
+    return found

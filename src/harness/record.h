@@ -1,0 +1,48 @@
+#pragma once
+// What is kept of a finished run: two small files beside its folder, seed-003.csv and
+// seed-003.json.
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "base/csv.h"
+#include "harness/manifest.h"
+#include "harness/metrics.h"
+
+namespace o2v {
+
+/// A file of the record of the run in the folder `dir`; `ending` is ".csv" or ".json".
+std::filesystem::path RecordPath(std::filesystem::path dir, const char* ending);
+
+/// The record of a finished run, as CSV on a grid of 10 000 steps up to `steps` (and `steps`
+/// itself). `return_20`: the last smoothed return at or before the grid step, not interpolated; no
+/// row before the first. The row of step 1 000 000 is therefore exactly return_at_1M. `usage_k` and
+/// `duration_k_steps`, for methods with options: mean over the updates since the grid step before;
+/// of the next update when there was none.
+std::string RecordCsv(std::span<const CurvePoint> episodes, const CsvTable& updates,
+                      std::int64_t steps);
+
+/// What made a record, as JSON: {"status", "steps", "revision" (of the method's code),
+/// "wall_seconds", "cpu_seconds", "commit", "compiler", "flags", "versions"} of the manifest.json
+/// given, and "config" (resolved, TOML).
+std::string RecordJson(const std::string& manifest_json, const std::string& config);
+
+/// Writes the record of the run in `dir`, done or diverged, whose manifest.json has this text and
+/// whose config asks for `wanted_steps`. The other files of the folder are read. Throws Error when
+/// one of them is damaged.
+void WriteRecord(const std::filesystem::path& dir, const std::string& manifest_json,
+                 std::int64_t wanted_steps);
+
+/// The part of a RecordJson that the program reads.
+struct Record {
+  RunStatus status;
+  std::int64_t steps;  // environment steps of all workers
+  int revision;        // of the method's code; 1 where the file does not say
+  std::string config;  // resolved, TOML
+};
+/// Reads a file of RecordJson. Throws Error when it cannot be read.
+Record ReadRecord(const std::filesystem::path& path);
+
+}  // namespace o2v

@@ -1,0 +1,219 @@
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+from plots.claims import (AUTHORS_PARAMETERS, CLAIMS, FAILS, HOLDS, OURS, RIVALS, UNDECIDED,
+                          UNMEASURED, Evidence, Finding, primary_share, verdict_of)
+from plots.records import FINITE, INFINITE, PAIRS, TASKS
+from plots.samples import Curve, Sample, author_samples, horizon_of
+from plots.statistics import Moments
+from tree import ROOT
+
+
+def sample(finals, task="HalfCheetah-v2", step=None, areas=None, gains=(0, 0), progress=100.0,
+           durations=((), ())):
+    finals = np.array(finals, dtype=float)
+    horizon = horizon_of(task)
+    curve = Curve(np.array([horizon]), finals[:1], np.zeros(1), len(finals))
+    return Sample(horizon, step or horizon, finals, finals, curve,
+                  Moments.of(finals if areas is None else areas), Moments.of(gains), progress,
+                  np.array(durations, dtype=float))
+
+
+def judged(text: str, evidence: Evidence) -> tuple[str, dict[str, Finding]]:
+    claim, = (c for c in CLAIMS if c.text.startswith(text))
+    findings = claim.judge(evidence)
+    return verdict_of(claim, findings), {f.part: f for f in findings}
+
+
+def versus(tasks, ours, rivals) -> Evidence:
+    """The same samples on every task; rivals by method, the rest of RIVALS far behind."""
+    behind = dict.fromkeys(RIVALS, [0, 1, 2])
+    return Evidence("paper", {(t, m): sample(x, t) for t in tasks
+                              for m, x in ({OURS: ours} | behind | rivals).items()})
+
+
+class AboveTest(unittest.TestCase):
+    TEXT = "Option2Vec is above DAC-OneStep"
+
+    def verdicts(self, onestep):
+        return judged(self.TEXT, versus(TASKS, [10, 11, 12], {"dac_onestep": onestep}))
+
+    def test_holds_does_not_hold_and_undecided(self):
+        for onestep, expected in (([1, 2, 3], HOLDS), ([20, 21, 22], FAILS),
+                                  ([9, 11, 13], UNDECIDED)):
+            verdict, parts = self.verdicts(onestep)
+            self.assertEqual({verdict}, {expected} | {f.verdict for f in parts.values()})
+
+    def test_one_task_below_refutes_all_ten(self):
+        evidence = versus(TASKS, [10, 11, 12], {"dac_onestep": [1, 2, 3]})
+        samples = dict(evidence.samples)
+        samples["Ant-v2", "dac_onestep"] = sample([20, 21, 22])
+        self.assertEqual(judged(self.TEXT, Evidence("paper", samples))[0], FAILS)
+
+    def test_a_missing_task_leaves_it_undecided_and_none_at_all_unmeasured(self):
+        evidence = versus(TASKS[1:], [10, 11, 12], {"dac_onestep": [1, 2, 3]})
+        verdict, parts = judged(self.TEXT, evidence)
+        self.assertEqual((verdict, parts[TASKS[0]].verdict), (UNDECIDED, UNMEASURED))
+        self.assertEqual(judged(self.TEXT, versus(TASKS, [1], {}))[0], UNMEASURED)
+
+    def test_one_seed_is_undecided(self):
+        self.assertEqual(judged(self.TEXT, versus(TASKS, [9], {"dac_onestep": [1]}))[0], UNDECIDED)
+
+    def test_shortened_runs_decide_nothing(self):
+        samples = {(t, m): sample(x, t, step=20_000) for t in TASKS
+                   for m, x in ((OURS, [10, 11, 12]), ("dac_onestep", [1, 2, 3]))}
+        self.assertEqual(judged(self.TEXT, Evidence("paper", samples))[0], UNMEASURED)
+
+    def test_an_undecided_part_says_how_many_seeds_it_takes(self):
+        # Sample variances 4, difference 2: one deviation, seventeen seeds.
+        _, parts = judged(self.TEXT, versus(TASKS, [8, 10, 12], {"dac_onestep": [6, 8, 10]}))
+        self.assertIn("would take 17 seeds", parts["Ant-v2"].measured)
+
+
+class FirstTest(unittest.TestCase):
+    TEXT = "Best on the four"
+
+    def test_needs_to_be_above_every_rival(self):
+        # PPO's mean is lower than DAC+PPO's, but so spread out that it is not told apart.
+        rivals = {"dac_ppo": [5, 6, 7], "ppo": [-15, 5, 20]}
+        verdict, parts = judged(self.TEXT, versus(INFINITE, [10, 11, 12], {"dac_ppo": [5, 6, 7]}))
+        self.assertEqual(verdict, HOLDS)
+        self.assertIn("DAC+PPO", parts["Swimmer-v2"].measured)
+        verdict, parts = judged(self.TEXT, versus(INFINITE, [10, 11, 12], rivals))
+        self.assertEqual(verdict, UNDECIDED)
+        self.assertIn("against PPO", parts["Swimmer-v2"].measured)
+        self.assertTrue(parts["Swimmer-v2"].leads)
+
+    def test_a_better_rival_refutes_it_even_when_others_are_missing(self):
+        evidence = Evidence("paper", {("Swimmer-v2", OURS): sample([1, 2, 3]),
+                                      ("Swimmer-v2", "iopg"): sample([8, 9, 10])})
+        self.assertEqual(judged(self.TEXT, evidence)[1]["Swimmer-v2"].verdict, FAILS)
+
+    def test_missing_rivals_leave_it_undecided(self):
+        evidence = Evidence("paper", {("Swimmer-v2", OURS): sample([8, 9, 10]),
+                                      ("Swimmer-v2", "ppo"): sample([1, 2, 3])})
+        finding = judged(self.TEXT, evidence)[1]["Swimmer-v2"]
+        self.assertEqual(finding.verdict, UNDECIDED)
+        self.assertIn("no runs of DAC+PPO, AHP+PPO, PPOC, OC", finding.measured)
+
+    def test_five_of_six_pairs_are_enough_and_two_lost_are_too_many(self):
+        for lost, expected in ((1, HOLDS), (2, FAILS)):
+            samples = dict(versus(PAIRS, [10, 11, 12], {}).samples)
+            for pair in list(PAIRS)[:lost]:
+                samples[pair, "ppo"] = sample([30, 31, 32], pair)
+            verdict, _ = judged("First on five of the six", Evidence("paper", samples))
+            self.assertEqual(verdict, expected)
+
+    def test_a_lost_pair_alone_does_not_refute_five_of_six(self):
+        samples = dict(versus(PAIRS, [10, 11, 12], {}).samples)
+        for pair, rival in zip(PAIRS, ([30, 31, 32], [9, 11, 13])):
+            samples[pair, "ppo"] = sample(rival, pair)
+        self.assertEqual(judged("First on five", Evidence("paper", samples))[0], UNDECIDED)
+
+    def test_a_rival_with_one_seed_cannot_be_beaten(self):
+        verdict, parts = judged(self.TEXT, versus(INFINITE, [10, 11, 12], {"oc": [1]}))
+        self.assertEqual(verdict, UNDECIDED)
+        self.assertIn("against OC", parts["Swimmer-v2"].measured)
+
+    def test_faster_is_about_the_area(self):
+        samples = {(t, m): sample([5, 5, 5], t, areas=[2, 2.1, 2.2] if m == OURS else [1, 1.1, 1.2])
+                   for t in INFINITE for m in (OURS, *RIVALS)}
+        self.assertEqual(judged("Faster", Evidence("paper", samples))[0], HOLDS)
+        self.assertEqual(judged(self.TEXT, Evidence("paper", samples))[0], UNDECIDED)
+
+
+class AgainstTheBestTest(unittest.TestCase):
+    def test_spread_smaller_larger_or_not_told_apart(self):
+        narrow, wide = list(100 + np.arange(10) / 10), list(100 + 20 * np.arange(10))
+        for ours, best, expected in ((narrow, wide, HOLDS), (wide, narrow, FAILS),
+                                     (narrow, narrow, UNDECIDED)):
+            verdict, _ = judged("Smaller variance", versus(INFINITE, ours, {"ppo": best}))
+            self.assertEqual(verdict, expected)
+
+    def test_comparable_within_a_fifth_of_the_best_rival(self):
+        # The best rival's mean is 100, the margin 20.
+        for ours, expected in (
+                ([99, 100, 101], HOLDS),
+                ([60, 61, 62], FAILS),       # clearly below
+                ([90, 91, 92], FAILS),       # below, though within the margin
+                ([60, 100, 140], UNDECIDED),  # the interval reaches too far
+                ([150, 151, 152], HOLDS)):
+            verdict, parts = judged("Comparable", versus(FINITE, ours, {"ppo": [99, 100, 101]}))
+            self.assertEqual(verdict, expected)
+            self.assertIn("margin 20.00", parts["Ant-v2"].measured)
+
+
+class AloneTest(unittest.TestCase):
+    def test_converged_when_the_gain_is_within_a_twentieth_of_the_progress(self):
+        for gains, expected in (([1, 2, 1, 2], HOLDS), ([8, 9, 8, 9], FAILS),
+                                ([-9, -8, -9, -8], FAILS), ([0, 9, 0, 9], UNDECIDED)):
+            evidence = Evidence("paper", {
+                (t, OURS): sample([1], t, gains=gains, progress=100) for t in TASKS})
+            self.assertEqual(judged("Option2Vec has converged", evidence)[0], expected)
+
+    def test_durations_grow_by_run(self):
+        for late, expected in (([5, 15, 25], HOLDS), ([1, 9, 19], FAILS), ([1, 20, 21], UNDECIDED)):
+            # Early 2, 11, 21 of the three runs: paired differences of a few steps.
+            evidence = Evidence("paper", {
+                (t, OURS): sample([1], t, durations=([2, 11, 21], late)) for t in TASKS})
+            self.assertEqual(judged("Option durations grow", evidence)[0], expected)
+        self.assertEqual(judged("Option durations", versus(TASKS, [1], {}))[0], UNMEASURED)
+
+
+class OtherTest(unittest.TestCase):
+    def test_the_share_of_parameters_depends_on_the_width(self):
+        evidence = Evidence("authors", {}, AUTHORS_PARAMETERS)
+        verdicts = [judged(f"15.8 % of the parameters of the option network, at {width}", evidence)
+                    for width in ("DAC's own width 64", "width 128")]
+        self.assertEqual([v for v, _ in verdicts], [FAILS, HOLDS])
+        self.assertIn("54.8 %", verdicts[0][1]["S = 17, A = 6"].measured)
+
+    def test_one_wrong_gradient_of_the_fidelity_counts(self):
+        rows = [{"name": "ppo all released", "largest_error": 2e-6},
+                {"name": "ppo all paper", "largest_error": 1e-9}]
+        verdicts = [judged("Gradients", Evidence(f, {}, gradcheck=rows))[0]
+                    for f in ("paper", "released")]
+        self.assertEqual(verdicts, [HOLDS, FAILS])
+
+    def test_theory_is_judged_by_statement(self):
+        rows = [{"name": name, "verdict": verdict} for name, verdict in (
+            ("Proposition 3.1 stationary", "PASS"), ("Proposition 3.1 for one V: false", "PASS"),
+            ("Proposition 3.2", "PASS"), ("Theorem 3.3", "PASS"),
+            ("Theorems 3.3 and 3.4 shared", "FAIL"))]
+        verdict, parts = judged("Propositions 3.1", Evidence("paper", {}, theory=rows))
+        self.assertEqual([f.verdict for f in parts.values()], [HOLDS, HOLDS, FAILS, FAILS])
+        self.assertEqual(verdict, FAILS)
+        self.assertIn("2 of 2 checks come out as said; 1 of them",
+                      parts["Proposition 3.1"].measured)
+        self.assertEqual(judged("Propositions 3.1", Evidence("paper", {}))[0], UNMEASURED)
+
+    def test_embeddings_aligned_with_actions_are_told_from_rotated_ones(self):
+        rng = np.random.default_rng(7)
+        aligned = np.zeros((12, 3))
+        aligned[np.arange(12), np.arange(12) % 3] = rng.normal(size=12) + 3
+        self.assertEqual(primary_share(aligned), 1)
+        for effects, expected in ((aligned, HOLDS), (rng.normal(size=(12, 3)), UNDECIDED)):
+            path = Path("results/interpret/paper/Hopper-v2/option2vec/seed-000.csv")
+            evidence = Evidence("paper", {}, effects={path: effects})
+            self.assertEqual(judged("Embeddings", evidence)[0], expected)
+
+    def test_the_authors_logs_say_what_is_known_of_them(self):
+        # Welch's p of these comparisons, worked out from the logs on their own: HalfCheetah
+        # against PPO 0.031, Swimmer against AHP+PPO 0.017, HumanoidStandup 0.018, Reacher 0.023
+        # in favour of PPO; Ant 0.0014 and Humanoid 0.0019 below PPO.
+        evidence = Evidence("authors", author_samples(ROOT / "results" / "reference"))
+        verdict, parts = judged("Best on the four", evidence)
+        self.assertEqual(verdict, FAILS)
+        for task, p in zip(INFINITE, ("0.031", "0.017", "0.018", "0.023")):
+            self.assertIn(f"p = {p}", parts[task].measured)
+        verdict, parts = judged("Comparable", evidence)
+        self.assertEqual([t for t, f in parts.items() if f.verdict == FAILS],
+                         ["Ant-v2", "Humanoid-v2"])
+        verdict, parts = judged("First on five", evidence)
+        self.assertEqual((verdict, sum(f.leads for f in parts.values())), (UNDECIDED, 4))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,146 @@
+import contextlib
+import io
+import re
+import sys
+import tempfile
+import unittest
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from unittest import mock
+
+from plots import fig_cost, fig_embedding, fig_learning_curves, fig_options, report
+from plots.style import inline_svg, svg_of
+from tree import with_reference, write_flat, write_run
+
+COUNTERS = {"physics_us": 80.5, "inference_us": 5, "learning_us": 20, "total_us": 105.5,
+            "bound_us": 99, "bound_products_us": 12, "bound_adam_us": 6.5, "MFLOP": 2,
+            "ratio": 1.07}
+
+
+def make(results: Path) -> dict[str, str]:
+    """The files of a report, by name. To save time without the figures' own files, which are in
+    the page, and without the learning curves, which are drawn as those of transfer are."""
+    with tempfile.TemporaryDirectory() as out, contextlib.ExitStack() as stack:
+        stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
+        arguments = ["report", "--results", str(results), "--out", out]
+        stack.enter_context(mock.patch.object(sys, "argv", arguments))
+        stack.enter_context(mock.patch.object(report, "save"))
+        stack.enter_context(mock.patch.object(fig_learning_curves, "draw", return_value=[]))
+        report.main()
+        return {path.name: path.read_text() for path in sorted(Path(out).iterdir())}
+
+
+class ReportTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.results = results = with_reference(Path(folder.name))
+        write_flat(results, "HalfCheetah-v2", "option2vec", [100, 110, 120],
+                   options="0.5,0.5,2,4", revision=2)
+        write_flat(results, "HalfCheetah-v2", "ppo", [50, 60, 70])
+        write_run(results, "HalfCheetah-v2", "ppo", 3, [1], status="diverged", steps=10_000,
+                  wanted=1_000_000)
+        write_run(results, "HalfCheetah-v2", "option2vec", 9, [0] * 100)  # revision 1
+        write_flat(results, "Cheetah", "ppo", [7, 8], fidelity="released", experiment="transfer")
+        write_flat(results, "HalfCheetah-v2", "ppo", [55, 65, 75], experiment="ablation",
+                   fidelity="paper-timelimit=released")
+        (results / "switches.txt").write_text(
+            "switch     paper  released  takes            methods  effect\n"
+            "timelimit  paper  released  paper, released  all      bootstrap | terminal\n")
+        (results / "theory.csv").write_text(
+            "name,gap,relation,tolerance,verdict,compared\nTheorem 3.3,1e-12,<,1e-9,PASS,both\n")
+        cls.files = make(results)
+
+    def row(self, *cells: str) -> list[str]:
+        lines = [line for line in self.files["REPORT.md"].splitlines()
+                 if line.startswith("| " + " | ".join(cells))]
+        self.assertEqual(len(lines), 1, cells)
+        return lines[0].strip("| ").split(" | ")
+
+    def test_means_deviations_and_numbers_of_seeds(self):
+        # Option2Vec: mean 110, squares 100 + 0 + 100; the middle half of three is 3/4 of the way
+        # of the outer values into the middle one: (0.25 * 100 + 110 + 0.25 * 120) / 1.5.
+        row = self.row("HalfCheetah-v2", "Option2Vec", "110")
+        self.assertEqual(row[2], "110.0 ± 8.165 (3)")
+        self.assertTrue(row[3].startswith("110.0 ["))
+        self.assertEqual(row[4], "3461 ± 209.5 (10)")
+        self.assertIn("1 of older revisions left out", row[-1])
+
+    def test_comparison_with_a_rival(self):
+        # Sample variances 100 and 100: t = 50 / sqrt(200/3) with 4 degrees of freedom, p 0.0036;
+        # half the interval is 2.776 * 8.165 = 22.67.
+        row = self.row("HalfCheetah-v2", "PPO", "60")
+        self.assertEqual(row[6:9], ["1.000 [1.000, 1.000]", "+50.00 [+27.33, +72.67]", "0.0036"])
+        self.assertEqual(row[-1], "1 diverged")
+
+    def test_transfer_has_both_ends(self):
+        self.assertEqual(self.row("Cheetah", "PPO", "7")[2], "7.500 ± 0.500 (2)")
+        self.assertEqual(self.row("Cheetah", "PPO", "7")[-2], "7.500 ± 0.500 (2)")
+
+    def test_the_ablations_effect_is_in_the_deviations(self):
+        row = self.row("timelimit")
+        self.assertEqual(row[2:4], ["bootstrap", "terminal"])
+        self.assertIn("HalfCheetah-v2, PPO: +5.000 [", row[-1])
+        self.assertEqual(row[-3], "paper (7)")  # three of Option2Vec's newest revision, four of PPO
+
+    def test_the_ledger_judges_three_sources(self):
+        row = self.row("Q2: Best on the four tasks without termination")
+        self.assertTrue(row[1].startswith("undecided at n = 3: undecided on 1, not measured on 3"))
+        self.assertTrue(row[3].startswith("does not hold at n = 10: holds on 3, does not hold on "))
+
+    def test_missing_runs_are_named(self):
+        self.assertEqual(self.row("HalfCheetah-v2", "seeds")[1],
+                         "seeds 3-9 of Option2Vec; seeds 0-9 of DAC-OneStep, DAC+PPO, AHP+PPO, "
+                         "IOPG, PPOC, OC; seeds 4-9 of PPO")
+        self.assertIn("9 of the grid's 2560 runs", self.files["REPORT.md"])
+
+    def test_the_page_is_whole_by_itself(self):
+        page = self.files["report.html"]
+        self.assertIn("prefers-color-scheme: dark", page)
+        self.assertIn('name="viewport"', page)
+        self.assertFalse(re.findall(r'(?:src|href)="(?!#)[^"]*"', page))
+        ids = re.findall(r'\bid="([^"]+)"', page)
+        self.assertEqual(len(ids), len(set(ids)))
+        self.assertFalse(set(re.findall(r'(?:url\(|href=")#([^")]+)', page)) - set(ids))
+        for svg in re.findall(r"<svg.*?</svg>", page, re.DOTALL):
+            ElementTree.fromstring(svg)
+
+    def test_is_the_same_when_made_again(self):
+        self.assertEqual(make(self.results), self.files)
+
+    def test_learning_curves_say_what_they_show(self):
+        onestep, *_ = fig_learning_curves.draw(self.results)
+        titles = [panel.get_title() for panel in onestep.figure.axes]
+        self.assertEqual(titles[0], "HalfCheetah-v2\nours, paper: 1 of 2 methods, n = 3")
+        self.assertEqual(sum("no runs yet" in title for title in titles), 19)
+
+    def test_figures_skip_what_is_not_there(self):
+        for module in (fig_cost, fig_embedding):
+            drawing, = module.draw(self.results)
+            self.assertIsNone(drawing.figure)
+            self.assertIn("No figure", drawing.caption)
+        paper, released = fig_options.draw(self.results)
+        self.assertIsNotNone(paper.figure)
+        self.assertIsNone(released.figure)
+
+    def test_embedding_and_cost_are_drawn_from_their_files(self):
+        with tempfile.TemporaryDirectory() as name:
+            results = Path(name)
+            folder = results / "interpret" / "paper" / "Hopper-v2" / "option2vec"
+            folder.mkdir(parents=True)
+            (folder / "seed-000.csv").write_text(
+                "dimension,embedding_0,embedding_1,effect_0\n0,1,2,0.5\n1,0,-1,-0.25\n")
+            (results / "bench.json").write_text(str({"benchmarks": [
+                {"name": f"step/Humanoid-v2/{m}/{f}/iterations:5"} | COUNTERS
+                for m in ("option2vec", "ppo", "oc") for f in ("paper", "released")
+            ]}).replace("'", '"'))
+            embedding, = fig_embedding.draw(results)
+            self.assertEqual(embedding.name, "embedding_paper_Hopper-v2_seed-000")
+            cost, = fig_cost.draw(results)
+            self.assertIn("var(--ink)", inline_svg(cost))
+            self.assertNotIn("date", svg_of(cost))
+
+
+if __name__ == "__main__":
+    unittest.main()
