@@ -32,10 +32,12 @@ std::vector<Product> Products(const RunConfig& config, int S, int A);
 /// that learns once an episode.
 double AdamEntriesPerStep(const RunConfig& config, int S, int A, double episode_length);
 
-/// CPU seconds of one bare Eigen product of these shapes on data that stays in cache; measured
-/// once.
+/// CPU seconds of one bare Eigen product of these shapes on data that stays in cache. Takes some
+/// milliseconds.
 double ProductSeconds(Index m, Index k, Index n);
-/// CPU seconds an entry of clipping and Adam as memory passes over flat arrays; measured once.
+/// The same of all these products, an environment step; each shape is measured once a call.
+double ProductSecondsPerStep(const std::vector<Product>& products);
+/// CPU seconds an entry of clipping and Adam as memory passes over flat arrays.
 double AdamSecondsPerEntry();
 
 }  // namespace o2v::bench

@@ -41,15 +41,20 @@ class TimedEnv final : public Env {
   double* seconds_;
 };
 
-/// What training has cost over some steps.
+/// What training has cost over some steps, and what it had to cost.
 struct Cost {
-  std::int64_t steps = 0;                             // [environment steps]
-  std::size_t episodes = 0;                           // that ended
-  double total = INFINITY, collect = 0, physics = 0;  // CPU seconds
+  std::int64_t steps = 0;                      // [environment steps]
+  std::size_t episodes = 0;                    // that ended
+  double total = 0, collect = 0, physics = 0;  // CPU seconds
+  double products = 0, adam = 0;               // of the bound, CPU seconds
+
+  double Bound() const { return physics + products + adam; }
+  double Ratio() const { return total / Bound(); }
 };
 
-/// The least rollouts and updates that fill kSteps environment steps, once without counting them
-/// and then an iteration; the cheapest a step is reported.
+/// An iteration is the least rollouts and updates that fill kSteps environment steps, and then the
+/// bound, measured at once: the speed of a shared machine changes from second to second. The
+/// iteration of the median ratio is reported, after one that is not counted.
 void StepCost(benchmark::State& state, const std::string& task, const std::string& algorithm,
               const std::string& fidelity) {
   RunRequest request;
@@ -85,34 +90,33 @@ void StepCost(benchmark::State& state, const std::string& task, const std::strin
   env.Reset();
   train();
 
-  // The least of the iterations, as the bound takes the least of its timings: what the machine does
-  // besides is in neither.
-  Cost least;
-  for (auto _ : state) {
-    const Cost cost = train();
-    if (cost.total * double(least.steps) <= least.total * double(cost.steps)) least = cost;
-  }
-
-  const double scale = 1e6 / double(least.steps);  // [us an environment step]
   const int S = env.Spec().S, A = env.Spec().A;
-  double products = 0, mflop = 0;
-  for (const Product& p : Products(config, S, A)) {
-    products += 1e6 * ProductSeconds(p.m, p.k, p.n) * p.per_step;
-    mflop += p.MflopPerStep();
+  const std::vector<Product> products = Products(config, S, A);
+  std::vector<Cost> costs;
+  for (auto _ : state) {
+    Cost cost = train();
+    const double steps = double(cost.steps);
+    const double adam_entries =
+        AdamEntriesPerStep(config, S, A, steps / double(std::max<std::size_t>(cost.episodes, 1)));
+    cost.products = steps * ProductSecondsPerStep(products);
+    cost.adam = steps * AdamSecondsPerEntry() * adam_entries;
+    costs.push_back(cost);
   }
-  const double episode_length = double(least.steps) / double(least.episodes);
-  const double adam =
-      1e6 * AdamSecondsPerEntry() * AdamEntriesPerStep(config, S, A, episode_length);
-  const double total = least.total * scale, bound = least.physics * scale + products + adam;
-  state.counters["total_us"] = total;
-  state.counters["physics_us"] = least.physics * scale;
-  state.counters["inference_us"] = (least.collect - least.physics) * scale;
-  state.counters["learning_us"] = (least.total - least.collect) * scale;
-  state.counters["bound_us"] = bound;
-  state.counters["bound_products_us"] = products;
-  state.counters["bound_adam_us"] = adam;
+  const auto median = costs.begin() + std::ptrdiff_t(costs.size() / 2);
+  std::ranges::nth_element(costs, median, {}, &Cost::Ratio);
+
+  const double scale = 1e6 / double(median->steps);  // [us an environment step]
+  double mflop = 0;
+  for (const Product& p : products) mflop += p.MflopPerStep();
+  state.counters["total_us"] = median->total * scale;
+  state.counters["physics_us"] = median->physics * scale;
+  state.counters["inference_us"] = (median->collect - median->physics) * scale;
+  state.counters["learning_us"] = (median->total - median->collect) * scale;
+  state.counters["bound_us"] = median->Bound() * scale;
+  state.counters["bound_products_us"] = median->products * scale;
+  state.counters["bound_adam_us"] = median->adam * scale;
   state.counters["MFLOP"] = mflop;
-  state.counters["ratio"] = total / bound;
+  state.counters["ratio"] = median->Ratio();
 }
 
 /// Option2Vec and PPO on every gym task and one of each domain of DeepMind Control, where a

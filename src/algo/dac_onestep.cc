@@ -23,8 +23,6 @@ class DacOneStep final : public DoubleActorCritic {
  public:
   explicit DacOneStep(const AlgorithmInput& in);
 
-  std::vector<Param*> Params() override;
-
  private:
   struct Cache {
     std::vector<int> rows;  // samples that the net of o' serves; they fill the first columns of
@@ -44,15 +42,14 @@ class DacOneStep final : public DoubleActorCritic {
   bool Rectified(char init) const { return Unnormalised() && !init; }
 
   void OptionForward(const ConstMatRef& s, std::span<const int> o_prev, std::span<const char> init,
-                     Asked asked, Mat& p) override;
+                     When when, Mat& p) override;
   void OptionBackward(const ConstMatRef& s, std::span<const int> o_prev, std::span<const char> init,
                       const Mat& dp) override;
 
-  const Index K_;
   Net policy_net_;  // of [s, o']
   LayerNorm norm_;  // with the numeric index only
   Linear y0_, y1_;  // the net y, with swapped roles only
-  Net critic_;
+  Net critic_net_;
   OptionPolicies policies_;
   // The authors' network keeps the head and the terminations that nobody uses; they count, and
   // exist only when all three switches are `released` (spec 2.4).
@@ -61,8 +58,7 @@ class DacOneStep final : public DoubleActorCritic {
   CacheByWidth<Cache> caches_;
 };
 
-DacOneStep::DacOneStep(const AlgorithmInput& in)
-    : DoubleActorCritic(in), K_(in.hyper->Int("options", 1)) {
+DacOneStep::DacOneStep(const AlgorithmInput& in) : DoubleActorCritic(in) {
   Rng init(in.seed, "init");
   const Index h = in.hyper->Int("hidden", 1), h_y = in.hyper->Int("ynet_hidden", 1);
   const Activation g = ReadActivation(*in.hyper);
@@ -76,41 +72,30 @@ DacOneStep::DacOneStep(const AlgorithmInput& in)
     XavierUniform(y0_.W.value, init);
     XavierUniform(y1_.W.value, init);
   }
-  critic_ = Net("critic.body", "critic.q", in.S, h, K_, g, init);
+  critic_net_ = Net("critic.body", "critic.q", in.S, h, K_, g, init);
   policies_ = OptionPolicies(K_, in.S, in.A, h, g, init);
   if (NumericIndex() && Swapped() && Unnormalised()) {
     unused_head_.emplace_back("critic.u", h, K_ + 1);
     unused_beta_ = OptionBank("beta", K_, in.S, h, 1, g, init);
   }
-  Assemble(
-      policies_, critic_,
-      [](const std::string& name) {
-        return name.starts_with("policy.") || name.starts_with("master.") ||
-               name.starts_with("ynet.") || name.starts_with("critic.body.") ||
-               name.starts_with("critic.q.");
-      },
-      [](const std::string& name) {
-        return name.starts_with("critic.body.") || name.starts_with("critic.q.") ||
-               name.find(".mu.") != std::string::npos || name.ends_with(".rho");
-      });
-}
-
-std::vector<Param*> DacOneStep::Params() {
   std::vector<Param*> params = policy_net_.Params();
   if (NumericIndex()) Append(params, norm_.Params());
   if (Swapped()) {
     Append(params, y0_.Params());
     Append(params, y1_.Params());
   }
-  Append(params, critic_.Params());
+  Append(params, critic_net_.Params());
   for (Linear& head : unused_head_) Append(params, head.Params());
   for (Index k = 0; k < K_; ++k) Append(params, policies_.Params(k));
   for (Index k = 0; k < unused_beta_.K(); ++k) Append(params, unused_beta_[k].Params());
-  return params;
+  const auto in_option_policy = [](const std::string& name) {
+    return name.starts_with("policy.") || name.starts_with("master.") || name.starts_with("ynet.");
+  };
+  AssembleStages(in, std::move(params), in_option_policy, &policies_, &critic_net_);
 }
 
 void DacOneStep::OptionForward(const ConstMatRef& s, std::span<const int> o_prev,
-                               std::span<const char> init, Asked, Mat& p) {
+                               std::span<const char> init, When, Mat& p) {
   const Index S = s.rows(), B = s.cols(), h = policy_net_.body.layer1.W.value.rows();
   Cache& c = caches_(B);
   c.rows.reserve(std::size_t(B));

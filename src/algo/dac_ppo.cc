@@ -1,5 +1,4 @@
 #include "algo/double_actor_critic.h"
-#include "dist/categorical.h"
 
 namespace o2v {
 namespace {
@@ -15,48 +14,31 @@ class DacPpo final : public DoubleActorCritic {
  public:
   explicit DacPpo(const AlgorithmInput& in) : DoubleActorCritic(in) {
     Rng init(in.seed, "init");
-    nets_ = OptionNets(in.hyper->Int("options", 1), in.S, in.A, in.hyper->Int("hidden", 1),
-                       ReadActivation(*in.hyper), OptionNets::CriticHead::kQ, init);
-    Assemble(
-        nets_.policy, nets_.critic,
-        [](const std::string& name) {
-          return name.starts_with("master.") || name.starts_with("critic.body.") ||
-                 name.starts_with("critic.q.") || name.find(".beta.") != std::string::npos;
-        },
-        [](const std::string& name) {
-          return name.starts_with("critic.body.") || name.starts_with("critic.q.") ||
-                 name.find(".mu.") != std::string::npos || name.ends_with(".rho");
-        });
+    nets_ = MakeOptionNets(in, OptionNets::CriticHead::kQ, init);
+    const auto in_option_policy = [](const std::string& name) {
+      return name.starts_with("master.") || name.find(".beta.") != std::string::npos;
+    };
+    AssembleStages(in, nets_.Params(), in_option_policy, &nets_.policy, &nets_.critic);
   }
 
-  std::vector<Param*> Params() override { return nets_.Params(); }
-
  private:
-  struct Cache {
-    Net::Cache master;  // out is the logits z
-    OptionNets::BetaCache beta;
-    Mat log_pi, pi, M;  // (K, B)
-  };
-
   void OptionForward(const ConstMatRef& s, std::span<const int> o_prev, std::span<const char> init,
-                     Asked asked, Mat& p) override {
-    Cache& c = caches_(s.cols());
-    nets_.master.Forward(s, c.master);
-    LogSoftmax(c.master.out, c.log_pi, c.pi);
-    nets_.Beta(s, o_prev, switches_.beta_index == Fidelity::kReleased, c.beta);
-    c.M.resize(c.pi.rows(), c.pi.cols());
-    OneHot(o_prev, c.M);
-    if (asked == Asked::kUpdate && switches_.dac_update_mask == Fidelity::kReleased) {
+                     When when, Mat& p) override {
+    OptionNets::Process& c = caches_(s.cols());
+    nets_.Master(s, c);
+    nets_.CallAndReturn(s, o_prev, init, c.pi, switches_.beta_index, c);
+    if (when == When::kUpdate && switches_.dac_update_mask == Fidelity::kReleased) {
       // Every o' of the batch is marked in the first row, none in the others; spec 4.6 (g)
       c.M.col(0) = c.M.rowwise().maxCoeff();
       c.M.rightCols(c.M.cols() - 1).setZero();
+      CallAndReturn(c.pi, c.beta.beta, c.M, o_prev, init, switches_.beta_index, c.pi_hat);
     }
-    CallAndReturn(c.pi, c.beta.beta, c.M, o_prev, init, switches_.beta_index, p);
+    p = c.pi_hat;
   }
 
   void OptionBackward(const ConstMatRef& s, std::span<const int> o_prev, std::span<const char> init,
                       const Mat& dp) override {
-    Cache& c = caches_(s.cols());
+    OptionNets::Process& c = caches_(s.cols());
     CallAndReturnBackward(dp, c.pi, c.beta.beta, c.M, o_prev, init, switches_.beta_index,
                           c.master.dout, c.beta.db);
     nets_.master.Backward(s, c.master);
@@ -64,7 +46,7 @@ class DacPpo final : public DoubleActorCritic {
   }
 
   OptionNets nets_;
-  CacheByWidth<Cache> caches_;
+  CacheByWidth<OptionNets::Process> caches_;
 };
 
 }  // namespace

@@ -1,10 +1,8 @@
 #include <cmath>
 
-#include "algo/algorithm.h"
-#include "algo/option_nets.h"
+#include "algo/method.h"
 #include "algo/option_policy.h"
-#include "algo/ppo_core.h"
-#include "algo/surrogate.h"
+#include "base/check.h"
 #include "dist/categorical.h"
 #include "dist/diag_gaussian.h"
 
@@ -25,7 +23,7 @@ namespace {
 /// Switches: `iopg_init_flag` = released takes every step for a first one, so that m_t = pi(s_t)
 /// and no termination matters; `iopg_posterior` = released weighs m_t with p_t in place of p_{t-1}.
 /// Source: spec 4.5; Smith et al. 2018.
-class Iopg final : public Algorithm {
+class Iopg final : public Method {
  public:
   explicit Iopg(const AlgorithmInput& in);
 
@@ -33,21 +31,11 @@ class Iopg final : public Algorithm {
   void Collect(VecEnv& env, std::vector<Episode>& episodes) override;
   void Update(std::vector<double>& stats) override;
   void ChangeTask() override;
-  std::vector<std::string> StatNames() const override;
-  std::vector<Param*> Params() override { return nets_.Params(); }
   void Visit(StateVisitor& v) override;
-
-  int NumOptions() const override { return int(K_); }
   void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
                     Mat& P) override;
-  void ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, Mat& sigma) override;
-  void OptionValues(const Mat& s, const std::vector<int>& o, Mat& q) override;
-
-  std::vector<std::string> Stages() const override { return {"all"}; }
   /// The batch is one episode, its rewards in batch.r.
   LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) override;
-  double Step(int stage) override;
-  std::vector<char> InGraph(int) const override { return in_graph_; }
 
  private:
   /// Steps that pass through the networks together; an episode's last block is padded with zeros.
@@ -63,21 +51,12 @@ class Iopg final : public Algorithm {
     int o_prev = 0;
   };
 
-  /// What acting at one state leaves behind.
-  struct Acting {
-    Net::Cache master, critic;
-    OptionNets::BetaCache beta;
-    OptionPolicies::Cache policy;
-    Mat log_pi, pi, M, P;  // (K, B)
-  };
-
   /// What a block of an episode leaves behind.
   struct Block {
     Mat s, a;  // (S, kBlock); (A, K kBlock), the actions once for each option
-    Net::Cache master, critic;
-    OptionNets::BetaCache beta;
+    OptionNets::Process options;
+    Net::Cache critic;
     OptionPolicies::Cache policy;
-    Mat log_pi, pi;   // (K, kBlock)
     Vec logp, dlogp;  // (K kBlock) option after option
   };
 
@@ -96,9 +75,9 @@ class Iopg final : public Algorithm {
   };
 
   bool AlwaysInitial() const { return switches_.iopg_init_flag == Fidelity::kReleased; }
-  /// The distribution of the next option at s -> c.P.
-  void Options(OptionNets& nets, const ConstMatRef& s, std::span<const int> o_prev,
-               std::span<const char> init, Acting& c) const;
+  /// The distribution of the next option at s.
+  const Mat& Options(OptionNets& nets, const ConstMatRef& s, std::span<const int> o_prev,
+                     std::span<const char> init);
   /// Loss and gradients of `nets` on an episode of n steps.
   LossTerms EpisodeLoss(OptionNets& nets, const ConstMatRef& s, const ConstMatRef& a,
                         std::span<const double> r, std::span<const int> init);
@@ -106,43 +85,32 @@ class Iopg final : public Algorithm {
   void BackwardHistory(std::span<const int> init, Index n);
 
   const double gamma_;
-  const Switches switches_;
-  const Index K_;
-  Rng policy_rng_;
+  Rng& policy_rng_ = NewStream("policy");
   OptionNets nets_;  // the master copy
-  std::vector<Param*> params_;
   std::vector<Worker> workers_;
-  std::unique_ptr<Adam> adam_;
-  std::vector<char> in_graph_;
 
   std::vector<int> finished_;  // workers whose episodes ended in the last step
-  CacheByWidth<Acting> acting_;
+  CacheByWidth<OptionNets::Process> options_;
+  // As many as the longest episode so far has needed: what the time limit allows would be tens of
+  // megabytes. A longer episode adds to them, once, and nothing else on the training path allocates
+  // after the first update.
   std::vector<std::unique_ptr<Block>> blocks_;
   History history_;
   Mat a_, a_one_;  // (A, N), (A, 1)
   Transition transition_;
   std::vector<int> o_one_;
   std::vector<int> init_given_;
-  OptionUsage usage_;
-  LossMeans means_;
 };
 
 Iopg::Iopg(const AlgorithmInput& in)
-    : gamma_(in.hyper->Real("gamma")),
-      switches_(in.switches),
-      K_(in.hyper->Int("options", 1)),
-      policy_rng_(in.seed, "policy"),
+    : Method(in, in.hyper->Int("options", 1)),
+      gamma_(in.hyper->Real("gamma")),
       workers_(std::size_t(in.workers)),
       a_(in.A, in.workers),
-      o_one_(1),
-      usage_(K_) {
+      o_one_(1) {
   Rng init(in.seed, "init");
-  const auto make = [&] {
-    return OptionNets(K_, in.S, in.A, in.hyper->Int("hidden", 1), ReadActivation(*in.hyper),
-                      OptionNets::CriticHead::kQ, init);
-  };
+  const auto make = [&] { return MakeOptionNets(in, OptionNets::CriticHead::kQ, init); };
   nets_ = make();
-  params_ = nets_.Params();
   // Two time limits: at a change of task the running episode goes on into the new one (spec 4.5).
   const Index room = 2 * Index(in.time_limit);
   for (Worker& worker : workers_) {
@@ -153,8 +121,8 @@ Iopg::Iopg(const AlgorithmInput& in)
     worker.r = VecD::Zero(room);
     worker.init.assign(std::size_t(room), 0);
   }
-  for (const Param* p : params_) in_graph_.push_back(!p->name.starts_with("critic.u."));
-  adam_ = std::make_unique<Adam>(params_, ReadAdam(*in.hyper));
+  const auto reached = [](const std::string& name) { return !name.starts_with("critic.u."); };
+  Assemble(in, nets_.Params(), {reached}, &nets_.policy, &nets_.critic);
   finished_.reserve(workers_.size());
   history_.Resize(K_, room);
   init_given_.reserve(std::size_t(room));
@@ -168,9 +136,7 @@ void Iopg::ChangeTask() {
 }
 
 void Iopg::Visit(StateVisitor& v) {
-  for (Param* p : params_) v.Matrix(p->name, p->value);
-  adam_->Visit(v);
-  policy_rng_.Visit(v, "rng.policy");
+  Method::Visit(v);
   for (std::size_t i = 0; i < workers_.size(); ++i) {
     Worker& worker = workers_[i];
     const std::string name = "copy" + std::to_string(i) + ".";
@@ -186,32 +152,28 @@ void Iopg::Visit(StateVisitor& v) {
 
 // ---- Acting -------------------------------------------------------------------------------------
 
-void Iopg::Options(OptionNets& nets, const ConstMatRef& s, std::span<const int> o_prev,
-                   std::span<const char> init, Acting& c) const {
-  nets.master.Forward(s, c.master);
-  LogSoftmax(c.master.out, c.log_pi, c.pi);
-  if (AlwaysInitial()) {
-    c.P = c.pi;
-    return;
-  }
-  nets.Beta(s, o_prev, switches_.beta_index == Fidelity::kReleased, c.beta);
-  c.M.resize(K_, s.cols());
-  OneHot(o_prev, c.M);
-  CallAndReturn(c.pi, c.beta.beta, c.M, o_prev, init, switches_.beta_index, c.P);
+const Mat& Iopg::Options(OptionNets& nets, const ConstMatRef& s, std::span<const int> o_prev,
+                         std::span<const char> init) {
+  OptionNets::Process& c = options_(s.cols());
+  nets.Master(s, c);
+  if (AlwaysInitial()) return c.pi;
+  nets.CallAndReturn(s, o_prev, init, c.pi, switches_.beta_index, c);
+  return c.pi_hat;
 }
 
 void Iopg::Collect(VecEnv& env, std::vector<Episode>& episodes) {
-  usage_.Clear();
   finished_.clear();
-  Acting& c = acting_(1);
+  Asked& c = asked_(1);
   for (Worker& worker : workers_) worker.nets.policy.MakeSigma();
   while (finished_.empty()) {
     for (std::size_t i = 0; i < workers_.size(); ++i) {
       Worker& worker = workers_[i];
       const auto s = env.States().col(Index(i));
       const bool init = env.Init()[i];
-      Options(worker.nets, s, {&worker.o_prev, 1}, {&env.Init()[i], 1}, c);
-      SampleCategorical(c.P, policy_rng_, o_one_);
+      Check(worker.length < worker.r.size(), "iopg: an episode of more than ", worker.r.size(),
+            " steps, twice the time limit of the task it was made for");
+      SampleCategorical(Options(worker.nets, s, {&worker.o_prev, 1}, {&env.Init()[i], 1}),
+                        policy_rng_, o_one_);
       worker.nets.policy.ForwardOne(s, o_one_, c.policy);
       SampleGaussian(c.policy.nets.out, c.policy.sigma, policy_rng_, a_one_);
       a_.col(Index(i)) = a_one_;
@@ -237,7 +199,6 @@ void Iopg::Collect(VecEnv& env, std::vector<Episode>& episodes) {
 }
 
 void Iopg::Update(std::vector<double>& stats) {
-  means_.Clear();
   for (const int i : finished_) {
     Worker& worker = workers_[std::size_t(i)];
     const Index n = worker.length;
@@ -245,10 +206,9 @@ void Iopg::Update(std::vector<double>& stats) {
         EpisodeLoss(worker.nets, worker.s.leftCols(n), worker.a.leftCols(n),
                     {worker.r.data(), std::size_t(n)}, {worker.init.data(), std::size_t(n)});
     for (std::size_t j = 0; j < params_.size(); ++j) {
-      params_[j]->grad = worker.params[j]->grad;
-      worker.params[j]->grad.setZero();
+      params_[j]->grad.swap(worker.params[j]->grad);  // the master's is zero after a step
     }
-    means_.Add(terms, Step(0));
+    StepOn(0, terms);
   }
   // After all of them: those that finished together used the same old copies.
   for (const int i : finished_) {
@@ -256,9 +216,7 @@ void Iopg::Update(std::vector<double>& stats) {
     for (std::size_t j = 0; j < params_.size(); ++j) worker.params[j]->value = params_[j]->value;
     worker.length = 0;
   }
-  stats.clear();
-  means_.Report(stats);
-  usage_.Report(stats);
+  Report(stats);
 }
 
 // ---- Loss ---------------------------------------------------------------------------------------
@@ -385,17 +343,16 @@ LossTerms Iopg::EpisodeLoss(OptionNets& nets, const ConstMatRef& s, const ConstM
     for (Index k = 0; k < K_; ++k) {
       block.a.middleCols(k * kBlock, m) = a.middleCols(start, m);
     }
-    nets.master.Forward(block.s, block.master);
-    LogSoftmax(block.master.out, block.log_pi, block.pi);
+    nets.Master(block.s, block.options);
     nets.critic.Forward(block.s, block.critic);
     nets.policy.ForwardAll(block.s, block.policy);
     GaussianLogProb(block.a, block.policy.nets.out, block.policy.sigma, block.logp);
-    if (betas) nets.Beta(block.s, {}, true, block.beta);
+    if (betas) nets.Beta(block.s, {}, true, block.options.beta);
     const Eigen::Map<const Mat> logp(block.logp.data(), kBlock, K_);
     h.log_p.middleCols(start, m) = logp.topRows(m).transpose().cast<double>();
-    h.pi.middleCols(start, m) = block.pi.leftCols(m).cast<double>();
+    h.pi.middleCols(start, m) = block.options.pi.leftCols(m).cast<double>();
     if (betas) {
-      h.beta.middleCols(start, m) = block.beta.beta.leftCols(m).cast<double>();
+      h.beta.middleCols(start, m) = block.options.beta.beta.leftCols(m).cast<double>();
     } else {
       h.beta.middleCols(start, m).setOnes();
     }
@@ -428,16 +385,16 @@ LossTerms Iopg::EpisodeLoss(OptionNets& nets, const ConstMatRef& s, const ConstM
     GaussianLogProbGrad(block.a, block.policy.nets.out, block.policy.sigma, block.dlogp,
                         block.policy.nets.dout, block.policy.dsigma);
     nets.policy.Backward(block.s, {}, block.policy);
-    block.master.dout.setZero(K_, kBlock);
-    block.master.dout.leftCols(m) = h.dz.middleCols(start, m).cast<Real>();
-    nets.master.Backward(block.s, block.master);
+    block.options.master.dout.setZero(K_, kBlock);
+    block.options.master.dout.leftCols(m) = h.dz.middleCols(start, m).cast<Real>();
+    nets.master.Backward(block.s, block.options.master);
     block.critic.dout.setZero(K_, kBlock);
     block.critic.dout.row(0).head(m) = h.dv.segment(start, m).transpose().cast<Real>();
     nets.critic.Backward(block.s, block.critic);
     if (!betas) continue;
-    block.beta.db.setZero(K_, kBlock);
-    block.beta.db.leftCols(m) = h.db.middleCols(start, m).cast<Real>();
-    nets.BackwardBeta(block.s, {}, block.beta);
+    block.options.beta.db.setZero(K_, kBlock);
+    block.options.beta.db.leftCols(m) = h.db.middleCols(start, m).cast<Real>();
+    nets.BackwardBeta(block.s, {}, block.options.beta);
   }
   return terms;
 }
@@ -447,37 +404,11 @@ LossTerms Iopg::Loss(int, const Batch& batch, const FixedDraws*) {
   return EpisodeLoss(nets_, batch.s, batch.a, {batch.r.data(), std::size_t(batch.r.size())}, init);
 }
 
-double Iopg::Step(int) { return adam_->Step(in_graph_, IdleRule::kSkip); }
-
-std::vector<std::string> Iopg::StatNames() const {
-  std::vector<std::string> names;
-  LossMeans::Names("all", names);
-  usage_.Names(names);
-  return names;
-}
-
-// ---- Queries, of the master copy ----------------------------------------------------------------
-
+/// Of the master copy.
 void Iopg::OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
                         Mat& P) {
-  Acting& c = acting_(s.cols());
-  Options(nets_, s, o_prev, init, c);
-  P = c.P;
-  for (Index b = 0; b < P.cols(); ++b) P.col(b) /= P.col(b).sum();
-}
-
-void Iopg::ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, Mat& sigma) {
-  Acting& c = acting_(s.cols());
-  nets_.policy.MakeSigma();
-  nets_.policy.ForwardOne(s, o, c.policy);
-  mu = c.policy.nets.out;
-  sigma = c.policy.sigma;
-}
-
-void Iopg::OptionValues(const Mat& s, const std::vector<int>&, Mat& q) {
-  Acting& c = acting_(s.cols());
-  nets_.critic.Forward(s, c.critic);
-  q = c.critic.out;
+  P = Options(nets_, s, o_prev, init);
+  NormalizeColumns(P);
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
-#include "algo/algorithm.h"
+#include "algo/method.h"
 #include "algo/option2vec_nets.h"
 #include "algo/ppo_core.h"
-#include "algo/surrogate.h"
 #include "base/check.h"
 #include "dist/categorical.h"
 #include "dist/diag_gaussian.h"
@@ -23,29 +22,23 @@ namespace {
 ///
 /// o_hat is detached in action policy and critic: W_o learns by L_o alone, as memory of the
 /// attention and, with `o2v_prev_embed_grad` = paper, as part of the query. After a change of task
-/// it is constant (`o2v_freeze`).
+/// it is constant (`o2v_freeze`). Against the double actor-critic of DAC: one action policy and one
+/// critic for all options, fed with o_hat; V_bar in the loss takes P as it is, not as it was in the
+/// rollout; logarithms are the softmax's own.
 /// Source: spec 2.6, 2.7, 4.8, 6; paper Eq. (3), (8)-(10).
-class Option2Vec final : public Algorithm {
+class Option2Vec final : public Method {
  public:
   explicit Option2Vec(const AlgorithmInput& in);
 
   void Collect(VecEnv& env, std::vector<Episode>& episodes) override;
   void Update(std::vector<double>& stats) override;
-  std::vector<std::string> StatNames() const override;
   void ChangeTask() override { Freeze(); }
-  std::vector<Param*> Params() override;
   void Visit(StateVisitor& v) override;
-
-  int NumOptions() const override { return int(sizes_.K); }
   void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
                     Mat& P) override;
   void ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, Mat& sigma) override;
   void OptionValues(const Mat& s, const std::vector<int>& o, Mat& q) override;
-
-  std::vector<std::string> Stages() const override { return {"high", "low"}; }
   LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) override;
-  double Step(int stage) override;
-  std::vector<char> InGraph(int stage) const override { return in_graph_[std::size_t(stage)]; }
 
  private:
   enum Stage { kHigh = 0, kLow = 1 };
@@ -64,43 +57,29 @@ class Option2Vec final : public Algorithm {
   void MakeTables();
   /// Masks for a pass over B samples: drawn, or taken from `fixed`; null without dropout.
   const AttentionBlock::Masks* Dropout(Index B, const FixedDraws* fixed, Cache& c);
-  /// P, a drawn option and all option values at the states s: V_bar[s, o_prev] and Q_O[s, o].
-  void Evaluate(const Mat& s, std::span<const char> init, Cache& c);
   LossTerms OptionLoss(const Batch& batch, const FixedDraws* fixed);
   LossTerms ActionLoss(const Batch& batch, const FixedDraws* fixed);
-  void RunStage(int stage);
 
   static bool Paper(Fidelity f) { return f == Fidelity::kPaper; }
 
-  const PpoHyper hyper_;
-  const Switches switches_;
+  const double clip_;       // c
   const double w_o_, w_a_;  // entropy weights of option and action stage
   const Option2VecSizes sizes_;
-  const int N_;
   const bool scalar_critic_;
-  Rng policy_rng_, dropout_rng_, bootstrap_rng_, redraw_rng_, shuffle_rng_, order_rng_;
+  Rng &policy_rng_ = NewStream("policy"), &dropout_rng_ = NewStream("dropout"),
+      &bootstrap_rng_ = NewStream("bootstrap"), &redraw_rng_ = NewStream("redraw"),
+      &shuffle_rng_ = NewStream("shuffle"), &order_rng_ = NewStream("order");
 
   OptionPolicyNet options_;
   ActionPolicyNet action_;
-  OptionValueNet critic_;
-  std::vector<LayerNorm> unused_;  // one or none: spec 2.6 item 9
-  std::unique_ptr<Adam> adam_;
-  std::vector<char> in_graph_[2];
+  OptionValueNet critic_net_;
+  std::vector<LayerNorm> unused_;         // one or none: spec 2.6 item 9
   std::vector<std::size_t> init_params_;  // positions of the initial net in Params()
   bool frozen_ = false;                   // the task has changed, and o2v_freeze acts
 
-  Batch rollout_;  // T N samples
+  PpoRollout rollout_;
   Mat rollout_P_;  // (K, T N)
-  MatD mask_;      // (N, T)
-  CriticStream high_, low_;
-  std::vector<int> o_prev_;        // (N)
-  std::vector<char> not_initial_;  // (N) zeros
   CacheByWidth<Cache> caches_;
-  Mat a_;  // (A, N)
-  Transition transition_;
-  Minibatches minibatches_;
-  OptionUsage usage_;
-  LossMeans means_[2];
 };
 
 Option2VecSizes ReadSizes(const AlgorithmInput& in) {
@@ -116,73 +95,46 @@ Option2VecSizes ReadSizes(const AlgorithmInput& in) {
 }
 
 Option2Vec::Option2Vec(const AlgorithmInput& in)
-    : hyper_(*in.hyper),
-      switches_(in.switches),
+    : Method(in, in.hyper->Int("options", 1), {"high", "low"}),
+      clip_(in.hyper->Real("ratio_clip")),
       w_o_(in.hyper->Real("entropy_weight_option")),
       w_a_(in.hyper->Real("entropy_weight_action")),
       sizes_(ReadSizes(in)),
-      N_(in.workers),
       scalar_critic_(Paper(switches_.o2v_critic)),
-      policy_rng_(in.seed, "policy"),
-      dropout_rng_(in.seed, "dropout"),
-      bootstrap_rng_(in.seed, "bootstrap"),
-      redraw_rng_(in.seed, "redraw"),
-      shuffle_rng_(in.seed, "shuffle"),
-      order_rng_(in.seed, "order"),
-      high_(in.workers, hyper_.rollout),
-      low_(in.workers, hyper_.rollout),
-      minibatches_(Index(in.workers) * hyper_.rollout),
-      usage_(sizes_.K) {
+      rollout_(in, /*critics=*/2) {
   Rng init(in.seed, "init");
   const OptionPolicyNet::Form form{.two_tokens = !Paper(switches_.o2v_query),
                                    .init_relu = !Paper(switches_.o2v_init_relu),
                                    .prev_embed_grad = Paper(switches_.o2v_prev_embed_grad)};
   options_ = OptionPolicyNet(sizes_, form, init);
   action_ = ActionPolicyNet(sizes_, init);
-  critic_ = OptionValueNet(sizes_, scalar_critic_, init);
+  critic_net_ = OptionValueNet(sizes_, scalar_critic_, init);
   // The authors' network allocates one more LayerNorm; it counts, and exists only when every switch
   // of the architecture is `released` (spec 2.7).
   if (!scalar_critic_ && form.two_tokens && form.init_relu) {
     unused_.emplace_back("unused.ln", sizes_.S + sizes_.D);
   }
 
-  const std::vector<Param*> params = Params();
-  for (std::size_t i = 0; i < params.size(); ++i) {
-    const std::string& name = params[i]->name;
-    const bool action = name.starts_with("action."), critic = name.starts_with("critic."),
-               unused = name.starts_with("unused.");
-    in_graph_[kHigh].push_back(!action && !unused);
-    in_graph_[kLow].push_back(action || critic);
-    if (name.starts_with("init.")) init_params_.push_back(i);
-  }
-  adam_ = std::make_unique<Adam>(params, hyper_.adam);
-
-  const Index n = Index(N_) * hyper_.rollout;
-  rollout_.Resize(sizes_.S, sizes_.A, n);
-  rollout_P_ = Mat::Zero(sizes_.K, n);
-  mask_ = MatD::Ones(N_, hyper_.rollout);
-  o_prev_.assign(std::size_t(N_), 0);
-  not_initial_.assign(std::size_t(N_), 0);
-}
-
-std::vector<Param*> Option2Vec::Params() {
   std::vector<Param*> params = options_.Params();
   Append(params, action_.Params());
-  Append(params, critic_.Params());
+  Append(params, critic_net_.Params());
   for (LayerNorm& norm : unused_) Append(params, norm.Params());
-  return params;
+  const auto in_high = [](const std::string& name) {
+    return !name.starts_with("action.") && !name.starts_with("unused.");
+  };
+  const auto in_low = [](const std::string& name) {
+    return name.starts_with("action.") || name.starts_with("critic.");
+  };
+  Assemble(in, std::move(params), {in_high, in_low}, nullptr, nullptr);
+  for (std::size_t i = 0; i < params_.size(); ++i) {
+    if (params_[i]->name.starts_with("init.")) init_params_.push_back(i);
+  }
+  rollout_P_ = Mat::Zero(K_, rollout_.batch.Size());
+  o_prev_.assign(std::size_t(N_), 0);
 }
 
 void Option2Vec::Visit(StateVisitor& v) {
-  for (Param* p : Params()) v.Matrix(p->name, p->value);
-  adam_->Visit(v);
-  policy_rng_.Visit(v, "rng.policy");
-  dropout_rng_.Visit(v, "rng.dropout");
-  bootstrap_rng_.Visit(v, "rng.bootstrap");
-  redraw_rng_.Visit(v, "rng.redraw");
-  shuffle_rng_.Visit(v, "rng.shuffle");
-  order_rng_.Visit(v, "rng.order");
-  v.Ints("o_prev", o_prev_);
+  Method::Visit(v);
   int frozen = frozen_;
   v.Int("frozen", frozen);
   if (frozen && !frozen_) Freeze();
@@ -192,18 +144,17 @@ void Option2Vec::Freeze() {
   if (switches_.o2v_freeze == o2v::Freeze::kNone) return;
   frozen_ = true;
   const bool policy = switches_.o2v_freeze == o2v::Freeze::kPolicy;
-  const std::vector<Param*> params = Params();
   for (std::size_t i = 0; i < options_.Params().size(); ++i) {  // the first of Params()
-    if (!policy && params[i] != &options_.W_o) continue;
+    if (!policy && params_[i] != &options_.W_o) continue;
     in_graph_[kHigh][i] = 0;
-    if (switches_.o2v_freeze == o2v::Freeze::kPaper) adam_->Freeze(i);
+    if (switches_.o2v_freeze == o2v::Freeze::kPaper) Hold(i);
   }
 }
 
 void Option2Vec::MakeTables() {
   options_.MakeTables();
   action_.MakeTable(options_.W_o.value);
-  critic_.MakeTable(options_.W_o.value);
+  critic_net_.MakeTable(options_.W_o.value);
 }
 
 // ---- Rollout ------------------------------------------------------------------------------------
@@ -230,73 +181,47 @@ const AttentionBlock::Masks* Option2Vec::Dropout(Index B, const FixedDraws* fixe
   return &masks;
 }
 
-void Option2Vec::Evaluate(const Mat& s, std::span<const char> init, Cache& c) {
-  options_.Forward(s, o_prev_, init, Dropout(N_, nullptr, c), c.options);
-  SampleCategorical(c.options.P, bootstrap_rng_, c.o);
-  critic_.ForwardAll(s, c.o, options_.W_o.value, c.all);
-}
-
 void Option2Vec::Collect(VecEnv& env, std::vector<Episode>& episodes) {
   MakeTables();
+  Batch& batch = rollout_.batch;
   Cache& c = caches_(N_);
-  const Mat &P = c.options.P, &q = c.all.q;
   c.o.resize(std::size_t(N_));
-  usage_.Clear();
-  for (int t = 0; t < hyper_.rollout; ++t) {
-    const Index column = Index(t) * N_;
+  const auto act = [&](Index row) {
     const Mat& s = env.States();
     options_.Forward(s, o_prev_, env.Init(), Dropout(N_, nullptr, c), c.options);
-    SampleCategorical(P, policy_rng_, c.o);
+    SampleCategorical(c.options.P, policy_rng_, c.o);
     action_.Forward(s, c.o, c.action);
-    SampleGaussian(c.action.mu, c.action.sigma, policy_rng_, a_);
-    GaussianLogProb(a_, c.action.mu, c.action.sigma, c.logp);
-
-    rollout_.s.middleCols(column, N_) = s;
-    rollout_.a.middleCols(column, N_) = a_;
-    rollout_.low.logp_old.segment(column, N_) = c.logp;
-    rollout_P_.middleCols(column, N_) = P;
+    SampleGaussian(c.action.mu, c.action.sigma, policy_rng_, rollout_.a);
+    rollout_P_.middleCols(row, N_) = c.options.P;
     for (Index i = 0; i < N_; ++i) {
-      rollout_.high.logp_old(column + i) = c.options.log_P(c.o[std::size_t(i)], i);
+      batch.high.logp_old(row + i) = c.options.log_P(c.o[std::size_t(i)], i);
     }
-    RecordOptions(column, c.o, env.Init(), o_prev_, rollout_, usage_);
-
-    env.Step(a_, transition_, episodes);
-    high_.r.col(t) = low_.r.col(t) = transition_.r;
-    const bool time_limit = RecordEnds(transition_, t, mask_);
-    if (!Paper(switches_.o2v_init_flag)) {  // the update is given done_t = init_{t+1}
-      for (std::size_t i = 0; i < std::size_t(N_); ++i) {
-        rollout_.init[std::size_t(column) + i] = transition_.Done(i);
-      }
-    }
-    if (time_limit && Paper(switches_.timelimit)) {
-      // V_bar(s_last, o_t) and Q_O[s_last, o], o ~ P(. | s_last, o_t); spec 1.3
-      Evaluate(transition_.s_last, not_initial_, c);
-      for (int i = 0; i < N_; ++i) {
-        if (!transition_.TimeLimit(std::size_t(i))) continue;
-        high_.r(i, t) += hyper_.gamma * double(P.col(i).dot(q.col(i)));
-        low_.r(i, t) += hyper_.gamma * double(q(c.o[std::size_t(i)], i));
-      }
-    }
+    GaussianLogProb(rollout_.a, c.action.mu, c.action.sigma, c.logp);
+    batch.low.logp_old.segment(row, N_) = c.logp;
+    RecordOptions(row, c.o, env.Init(), batch);
+  };
+  const auto value = [&](const ConstMatRef& s, const ConstMatRef& P, std::span<const int> o,
+                         Index row) {
+    OptionValueNet::Cache& all = caches_(s.cols()).all;
+    critic_net_.ForwardAll(s, o, options_.W_o.value, all);
+    rollout_.SetOptionValues(P, all.q, o, row);  // V_bar and Q_O[s, o]
+  };
+  rollout_.Collect(
+      env, episodes, act,
+      [&](Index row, Index n) {
+        value(batch.s.middleCols(row, n), rollout_P_.middleCols(row, n), Rows(batch.o, row, n),
+              row);
+      },
+      [&](const Mat& s, std::span<const char> init) {
+        // The option o ~ P(. | s, o_{t-1}) that is drawn here is thrown away; spec 1.3.
+        options_.Forward(s, o_prev_, init, Dropout(N_, nullptr, c), c.options);
+        SampleCategorical(c.options.P, bootstrap_rng_, c.o);
+        value(s, c.options.P, c.o, batch.Size());
+      });
+  if (Paper(switches_.o2v_init_flag)) return;
+  for (std::size_t i = 0; i < batch.init.size(); ++i) {  // the update is given done_t = init_{t+1}
+    batch.init[i] = rollout_.mask.data()[i] == 0;
   }
-  // The critic does not act, so its values are taken after the rollout, in blocks.
-  ForEachBlock(rollout_.Size(), hyper_.minibatch, [&](Index start, Index n) {
-    Cache& block = caches_(n);
-    const std::span<const int> o =
-        std::span<const int>(rollout_.o).subspan(std::size_t(start), std::size_t(n));
-    critic_.ForwardAll(rollout_.s.middleCols(start, n), o, options_.W_o.value, block.all);
-    for (Index b = 0; b < n; ++b) {
-      high_.v.data()[start + b] = double(rollout_P_.col(start + b).dot(block.all.q.col(b)));
-      low_.v.data()[start + b] = double(block.all.q(o[std::size_t(b)], b));
-    }
-  });
-  // v_T: one more pass; the option that it draws is thrown away (spec 1.3).
-  Evaluate(env.States(), env.Init(), c);
-  for (int i = 0; i < N_; ++i) {
-    high_.v(i, hyper_.rollout) = double(P.col(i).dot(q.col(i)));
-    low_.v(i, hyper_.rollout) = double(q(c.o[std::size_t(i)], i));
-  }
-  high_.Finish(mask_, hyper_, switches_.adv_std_eps, rollout_.high);
-  low_.Finish(mask_, hyper_, switches_.adv_std_eps, rollout_.low);
 }
 
 // ---- Losses -------------------------------------------------------------------------------------
@@ -312,7 +237,7 @@ LossTerms Option2Vec::OptionLoss(const Batch& batch, const FixedDraws* fixed) {
   Cache& c = caches_(B);
   const Mat &P = c.options.P, &log_P = c.options.log_P, &q = c.all.q;
   options_.MakeTables();
-  critic_.MakeTable(W_o);
+  critic_net_.MakeTable(W_o);
   const AttentionBlock::Masks* masks = Dropout(B, fixed, c);
   options_.Forward(batch.s, batch.o_prev, batch.init, masks, c.options);
   c.o = batch.o;
@@ -323,7 +248,7 @@ LossTerms Option2Vec::OptionLoss(const Batch& batch, const FixedDraws* fixed) {
       SampleCategorical(P, redraw_rng_, c.o);
     }
   }
-  critic_.ForwardAll(batch.s, c.o, W_o, c.all);
+  critic_net_.ForwardAll(batch.s, c.o, W_o, c.all);
 
   c.logp.resize(B);
   c.v.resize(B);
@@ -331,8 +256,7 @@ LossTerms Option2Vec::OptionLoss(const Batch& batch, const FixedDraws* fixed) {
     c.logp(b) = log_P(batch.o[std::size_t(b)], b);
     c.v(b) = P.col(b).dot(q.col(b));
   }
-  ClippedSurrogate(c.logp, batch.high.logp_old, batch.high.adv_hat, hyper_.ratio_clip, terms,
-                   c.dlogp);
+  ClippedSurrogate(c.logp, batch.high.logp_old, batch.high.adv_hat, clip_, terms, c.dlogp);
   CategoricalEntropy(log_P, P, c.H);
   terms.entropy = double(c.H.sum()) / double(B);
   ValueLoss(c.v, batch.high.ret, terms, c.dv);
@@ -350,7 +274,7 @@ LossTerms Option2Vec::OptionLoss(const Batch& batch, const FixedDraws* fixed) {
     }
     dq.col(b) = c.dv(b) * P.col(b);
   }
-  critic_.Backward(batch.s, c.o, W_o, c.all);
+  critic_net_.Backward(batch.s, c.o, W_o, c.all);
   if (frozen_ && switches_.o2v_freeze == o2v::Freeze::kPolicy) return terms;  // P is detached
   options_.Backward(batch.s, batch.o_prev, masks, c.options);
   if (frozen_) options_.W_o.grad.setZero();
@@ -367,7 +291,7 @@ LossTerms Option2Vec::ActionLoss(const Batch& batch, const FixedDraws* fixed) {
   const Mat& W_o = options_.W_o.value;
   Cache& c = caches_(B);
   action_.MakeTable(W_o);
-  critic_.MakeTable(W_o);
+  critic_net_.MakeTable(W_o);
   c.o = batch.o;
   if (!Paper(switches_.o2v_option_in_update)) {
     if (fixed && !fixed->o.empty()) {
@@ -381,8 +305,7 @@ LossTerms Option2Vec::ActionLoss(const Batch& batch, const FixedDraws* fixed) {
   const Mat &mu = c.action.mu, &sigma = c.action.sigma;
   action_.Forward(batch.s, c.o, c.action);
   GaussianLogProb(batch.a, mu, sigma, c.logp);
-  ClippedSurrogate(c.logp, batch.low.logp_old, batch.low.adv_hat, hyper_.ratio_clip, terms,
-                   c.dlogp);
+  ClippedSurrogate(c.logp, batch.low.logp_old, batch.low.adv_hat, clip_, terms, c.dlogp);
   terms.entropy = GaussianMeanEntropy(sigma);
   GaussianLogProbGrad(batch.a, mu, sigma, c.dlogp, c.action.dmu, c.action.dsigma);
   if (w_a_ != 0) AddGaussianEntropyGrad(sigma, Real(-w_a_), c.action.dsigma);
@@ -391,49 +314,28 @@ LossTerms Option2Vec::ActionLoss(const Batch& batch, const FixedDraws* fixed) {
   OptionValueNet::Cache& critic = scalar_critic_ ? c.one : c.all;
   c.v.resize(B);
   if (scalar_critic_) {
-    critic_.ForwardOne(batch.s, c.o, critic);
+    critic_net_.ForwardOne(batch.s, c.o, critic);
     c.v = critic.q.row(0).transpose();
   } else {
-    critic_.ForwardAll(batch.s, c.o, W_o, critic);
+    critic_net_.ForwardAll(batch.s, c.o, W_o, critic);
     for (Index b = 0; b < B; ++b) c.v(b) = critic.q(c.o[std::size_t(b)], b);
   }
   ValueLoss(c.v, batch.low.ret, terms, c.dv);
   critic.dq.setZero(critic.q.rows(), B);
   for (Index b = 0; b < B; ++b) critic.dq(scalar_critic_ ? 0 : c.o[std::size_t(b)], b) = c.dv(b);
-  critic_.Backward(batch.s, c.o, W_o, critic);
+  critic_net_.Backward(batch.s, c.o, W_o, critic);
   terms.total = terms.surrogate - w_a_ * terms.entropy + terms.value;
   return terms;
 }
 
 // ---- Update -------------------------------------------------------------------------------------
 
-double Option2Vec::Step(int stage) {
-  return adam_->Step(in_graph_[stage],
-                     Paper(switches_.adam_idle) ? IdleRule::kSkip : IdleRule::kZeroGradient);
-}
-
-void Option2Vec::RunStage(int stage) {
-  means_[stage].Clear();
-  minibatches_.Run(rollout_, hyper_, shuffle_rng_, [&](const Batch& batch) {
-    const LossTerms terms = Loss(stage, batch, nullptr);
-    means_[stage].Add(terms, Step(stage));
-  });
-}
-
 void Option2Vec::Update(std::vector<double>& stats) {
   const int first = order_rng_.Uniform() < 0.5 ? kHigh : kLow;  // fair coin; spec 4.8 (f)
-  RunStage(first);
-  RunStage(1 - first);
-  stats.clear();
-  for (const LossMeans& means : means_) means.Report(stats);
-  usage_.Report(stats);
-}
-
-std::vector<std::string> Option2Vec::StatNames() const {
-  std::vector<std::string> names;
-  for (const std::string& stage : Stages()) LossMeans::Names(stage, names);
-  usage_.Names(names);
-  return names;
+  for (const int stage : {first, 1 - first}) {
+    rollout_.ForEpochs(shuffle_rng_, [&](const Batch& batch) { Learn(stage, batch); });
+  }
+  Report(stats);
 }
 
 // ---- Queries ------------------------------------------------------------------------------------
@@ -456,8 +358,8 @@ void Option2Vec::ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, 
 
 void Option2Vec::OptionValues(const Mat& s, const std::vector<int>& o, Mat& q) {
   Cache& c = caches_(s.cols());
-  critic_.MakeTable(options_.W_o.value);
-  critic_.ForwardAll(s, o, options_.W_o.value, c.all);
+  critic_net_.MakeTable(options_.W_o.value);
+  critic_net_.ForwardAll(s, o, options_.W_o.value, c.all);
   q = c.all.q;
 }
 

@@ -1,6 +1,8 @@
 #include "algo/option_nets.h"
 
+#include "algo/option_policy.h"
 #include "base/check.h"
+#include "dist/categorical.h"
 #include "nn/activation.h"
 #include "nn/embedding.h"
 #include "nn/init.h"
@@ -185,6 +187,20 @@ void OptionNets::BackwardBeta(const ConstMatRef& s, std::span<const int> o, Beta
     for (Index b = 0; b < B; ++b) c.nets.dout(0, b) = c.db(o[std::size_t(b)], b);
   }
   beta.Backward(s, c.nets);
+}
+
+void OptionNets::Master(const ConstMatRef& s, Process& c) const {
+  master.Forward(s, c.master);
+  LogSoftmax(c.master.out, c.log_pi, c.pi);
+}
+
+void OptionNets::CallAndReturn(const ConstMatRef& s, std::span<const int> o_prev,
+                               std::span<const char> init, const Mat& pi, Fidelity beta_index,
+                               Process& c) const {
+  Beta(s, o_prev, beta_index == Fidelity::kReleased, c.beta);
+  c.M.resize(pi.rows(), pi.cols());
+  OneHot(o_prev, c.M);
+  o2v::CallAndReturn(pi, c.beta.beta, c.M, o_prev, init, beta_index, c.pi_hat);
 }
 
 std::vector<Param*> OptionNets::Params() {

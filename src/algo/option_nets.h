@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "algo/switches.h"
 #include "base/rng.h"
 #include "nn/mlp.h"
 
@@ -101,6 +102,21 @@ struct OptionNets {
   void Beta(const ConstMatRef& s, std::span<const int> o, bool all, BetaCache& c) const;
   /// From c.db; arguments as given to Beta. Adds to the gradients.
   void BackwardBeta(const ConstMatRef& s, std::span<const int> o, BetaCache& c);
+
+  /// The call-and-return process at B states: a master policy pi(. | s) chooses when option o' has
+  /// terminated.
+  struct Process {
+    Net::Cache master;  // out is the logits z
+    BetaCache beta;     // of o', or of all options
+    Mat log_pi, pi;     // (K, B)
+    Mat M, pi_hat;      // (K, B) onehot(o'), the mixture of both
+  };
+  /// s (S, B) -> c.pi, c.log_pi.
+  void Master(const ConstMatRef& s, Process& c) const;
+  /// s (S, B), o_prev, init (B) -> c.pi_hat of spec 3.5, the mixture with pi (K, B): c.pi, or what
+  /// chooses in place of the master policy.
+  void CallAndReturn(const ConstMatRef& s, std::span<const int> o_prev, std::span<const char> init,
+                     const Mat& pi, Fidelity beta_index, Process& c) const;
 
   std::vector<Param*> Params();
 };

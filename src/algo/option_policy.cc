@@ -16,6 +16,10 @@ void OneHot(std::span<const int> o, Mat& M) {
   for (std::size_t b = 0; b < o.size(); ++b) M(o[b], Index(b)) = 1;
 }
 
+void NormalizeColumns(Mat& P) {
+  for (Index b = 0; b < P.cols(); ++b) P.col(b) /= P.col(b).sum();
+}
+
 void CallAndReturn(const Mat& pi, const Mat& beta, const Mat& M, std::span<const int> o_prev,
                    std::span<const char> init, Fidelity beta_index, Mat& pi_hat) {
   pi_hat.resize(pi.rows(), pi.cols());

@@ -14,6 +14,9 @@ inline constexpr double kLogEps = 1e-5;
 /// M.col(b) = onehot(o_b), (K, B).
 void OneHot(std::span<const int> o, Mat& M);
 
+/// Every column of P (K, B) divided by its sum: what an option is drawn with.
+void NormalizeColumns(Mat& P);
+
 /// Call-and-return option policy pi_hat (K, B), spec 3.5. pi, beta, M (K, B), M = onehot(o_prev):
 ///   beta_index = paper:     pi_hat_k = (1 - beta_{o'}) M_k + beta_{o'} pi_k
 ///   beta_index = released:  pi_hat_k = (1 - beta_k) M_k + beta_k pi_k, which need not sum to 1

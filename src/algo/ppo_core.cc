@@ -1,30 +1,8 @@
 #include "algo/ppo_core.h"
 
-#include <algorithm>
-#include <numeric>
+#include "rollout/gae.h"
 
 namespace o2v {
-
-PpoHyper::PpoHyper(const Settings& s)
-    : gamma(s.Real("gamma")),
-      lambda(s.Real("lambda")),
-      rollout(s.Int("rollout", 1)),
-      epochs(s.Int("epochs", 1)),
-      minibatch(s.Int("minibatch", 1)),
-      ratio_clip(s.Real("ratio_clip")),
-      adam(ReadAdam(s)) {}
-
-Adam::Options ReadAdam(const Settings& s) {
-  return {s.Real("learning_rate"), s.Real("adam_beta1"), s.Real("adam_beta2"), s.Real("adam_eps"),
-          s.Real("clip_norm")};
-}
-
-void CriticStream::Finish(const MatD& mask, const PpoHyper& hyper, double adv_std_eps,
-                          Stream& out) {
-  Gae(r, mask, v, hyper.gamma, hyper.lambda, adv, ret);
-  NormalizeAdvantages(adv, adv_std_eps, out.adv_hat);
-  out.ret = Eigen::Map<const VecD>(ret.data(), ret.size()).cast<Real>();
-}
 
 bool RecordEnds(const Transition& transition, int t, MatD& mask) {
   bool time_limit = false;
@@ -35,45 +13,46 @@ bool RecordEnds(const Transition& transition, int t, MatD& mask) {
   return time_limit;
 }
 
-void OptionUsage::Clear() {
-  std::fill(executed_.begin(), executed_.end(), 0);
-  std::fill(begun_.begin(), begun_.end(), 0);
+PpoRollout::PpoRollout(const AlgorithmInput& in, int n_critics)
+    : N_(in.workers),
+      T_(in.hyper->Int("rollout", 1)),
+      epochs_(in.hyper->Int("epochs", 1)),
+      minibatch_(in.hyper->Int("minibatch", 1)),
+      gamma_(in.hyper->Real("gamma")),
+      lambda_(in.hyper->Real("lambda")),
+      adv_std_eps_(in.switches.adv_std_eps),
+      bootstrap_(in.switches.timelimit == Fidelity::kPaper),
+      not_initial_(std::size_t(N_), 0),
+      order_(std::size_t(N_) * std::size_t(T_)) {
+  batch.Resize(in.S, in.A, Index(N_) * T_);
+  mask = MatD::Ones(N_, T_);
+  critics.assign(std::size_t(n_critics), CriticStream(N_, T_));
 }
 
-void OptionUsage::Count(int o, int o_prev, bool init) {
-  executed_[std::size_t(o)] += 1;
-  begun_[std::size_t(o)] += init || o != o_prev;
-}
-
-void OptionUsage::Report(std::vector<double>& stats) const {
-  const double steps = std::accumulate(executed_.begin(), executed_.end(), 0.0);
-  for (const double n : executed_) stats.push_back(n / steps);
-  for (std::size_t k = 0; k < executed_.size(); ++k) {
-    stats.push_back(executed_[k] / std::max(1.0, begun_[k]));
+void PpoRollout::SetOptionValues(const ConstMatRef& p, const Mat& q, std::span<const int> o,
+                                 Index row) {
+  double* high = critics[0].v.data() + row;
+  double* low = critics[1].v.data() + row;
+  for (Index b = 0; b < q.cols(); ++b) {
+    high[b] = double(p.col(b).dot(q.col(b)));
+    low[b] = double(q(o[std::size_t(b)], b));
   }
 }
 
-void OptionUsage::Names(std::vector<std::string>& names) const {
-  for (std::size_t k = 0; k < executed_.size(); ++k) names.push_back("usage_" + std::to_string(k));
-  for (std::size_t k = 0; k < executed_.size(); ++k) {
-    names.push_back("duration_" + std::to_string(k) + "_steps");
+void PpoRollout::Bootstrap(int t) {
+  for (int i = 0; i < N_; ++i) {
+    if (!transition_.TimeLimit(std::size_t(i))) continue;
+    for (CriticStream& critic : critics) critic.r(i, t) += gamma_ * critic.v(i, T_);
   }
 }
 
-void RecordOptions(Index column, std::span<const int> o, std::span<const char> init,
-                   std::vector<int>& o_prev, Batch& rollout, OptionUsage& usage) {
-  for (std::size_t i = 0; i < o.size(); ++i) {
-    const std::size_t row = std::size_t(column) + i;
-    rollout.o[row] = o[i];
-    rollout.o_prev[row] = o_prev[i];
-    rollout.init[row] = init[i];
-    usage.Count(o[i], o_prev[i], init[i]);
-    o_prev[i] = o[i];
+void PpoRollout::Finish() {
+  for (CriticStream& critic : critics) {
+    Stream& out = &critic == &critics.back() ? batch.low : batch.high;
+    Gae(critic.r, mask, critic.v, gamma_, lambda_, critic.adv, critic.ret);
+    NormalizeAdvantages(critic.adv, adv_std_eps_, out.adv_hat);
+    out.ret = Eigen::Map<const VecD>(critic.ret.data(), critic.ret.size()).cast<Real>();
   }
-}
-
-Activation ReadActivation(const Settings& settings) {
-  return settings.Int("activation") == 0 ? Activation::kTanh : Activation::kRelu;
 }
 
 }  // namespace o2v

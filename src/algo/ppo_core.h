@@ -1,120 +1,101 @@
 #pragma once
-// What the PPO-type methods share beside the losses: their numbers, the rollout's arrays, the
-// epochs over it and the caches.
+// Rollouts of the PPO-type methods: T steps, advantages and targets, epochs of minibatches.
 
-#include <map>
-#include <memory>
-#include <string>
 #include <vector>
 
 #include "algo/algorithm.h"
-#include "nn/activation.h"
-#include "nn/adam.h"
-#include "rollout/gae.h"
 #include "rollout/minibatch.h"
 
 namespace o2v {
 
-/// Numbers of spec 7 that every PPO-type method reads.
-struct PpoHyper {
-  double gamma, lambda;
-  int rollout;        // T, steps a worker
-  int epochs;         // of each stage
-  int minibatch;      // B
-  double ratio_clip;  // c
-  Adam::Options adam;
-
-  /// Reads gamma, lambda, rollout, epochs, minibatch, ratio_clip, learning_rate, adam_beta1,
-  /// adam_beta2, adam_eps, clip_norm. Throws ConfigError.
-  explicit PpoHyper(const Settings& settings);
-};
-
-/// Reads learning_rate, adam_beta1, adam_beta2, adam_eps, clip_norm. Throws ConfigError.
-Adam::Options ReadAdam(const Settings& settings);
-
-/// One critic's rewards and values over a rollout of T steps of N workers; a column is a step.
+/// One critic's rewards and values over a rollout of T steps of N workers; a column is a step. In
+/// memory order v has the value of every sample and then those of the N states after the rollout.
 struct CriticStream {
   MatD r;         // (N, T) rewards; where a time limit is bootstrapped, r + gamma v(s_last)
   MatD v;         // (N, T + 1)
   MatD adv, ret;  // (N, T)
 
   CriticStream(int N, int T) : r(MatD::Zero(N, T)), v(MatD::Zero(N, T + 1)), adv(r), ret(r) {}
-  /// GAE, normalised advantages and targets into `out`. Source: spec 1.3.
-  void Finish(const MatD& mask, const PpoHyper& hyper, double adv_std_eps, Stream& out);
 };
 
 /// Masks of a step of all workers, mask (N, T) 0 where an episode ended, into column t; true when
 /// one of them ended by its time limit only.
 bool RecordEnds(const Transition& transition, int t, MatD& mask);
 
-/// Epochs of shuffled minibatches over a rollout; the last of an epoch may be smaller.
-class Minibatches {
- public:
-  /// For a rollout of n samples.
-  explicit Minibatches(Index n) : order_(std::size_t(n)) {}
+/// Entries row..row+n-1 of an array with an entry a sample.
+template <typename T>
+std::span<const T> Rows(const std::vector<T>& x, Index row, Index n) {
+  return std::span<const T>(x).subspan(std::size_t(row), std::size_t(n));
+}
 
-  /// Calls use(batch) for every minibatch of every epoch.
+/// A rollout of T steps of N workers with one critic, whose advantages and targets are batch.low,
+/// or with two, of which the first one's are batch.high. Source: spec 1.3, 1.4.
+class PpoRollout {
+ public:
+  /// Reads gamma, lambda, rollout, epochs and minibatch.
+  PpoRollout(const AlgorithmInput& in, int critics);
+
+  Batch batch;  // T N samples
+  Mat a;        // (A, N) the actions that are taken next
+  MatD mask;    // (N, T)
+  std::vector<CriticStream> critics;
+
+  /// Takes T steps and finishes advantages and targets.
+  ///   act(row)             chooses `a` at env.States() and writes what else is kept of it into the
+  ///                        batch, at the columns from `row`
+  ///   value(row, n)        values of the samples from `row` on into the critics' v
+  ///   value_next(s, init)  values of other states s (S, N), after o_prev, into its last column
+  template <typename Act, typename Value, typename ValueNext>
+  void Collect(VecEnv& env, std::vector<Episode>& episodes, Act&& act, Value&& value,
+               ValueNext&& value_next) {
+    for (int t = 0; t < T_; ++t) {
+      const Index row = Index(t) * N_;
+      act(row);
+      batch.s.middleCols(row, N_) = env.States();
+      batch.a.middleCols(row, N_) = a;
+      env.Step(a, transition_, episodes);
+      for (CriticStream& critic : critics) critic.r.col(t) = transition_.r;
+      if (RecordEnds(transition_, t, mask) && bootstrap_) {
+        value_next(transition_.s_last, not_initial_);
+        Bootstrap(t);
+      }
+    }
+    for (Index row = 0; row < batch.Size(); row += minibatch_) {  // the critics do not act
+      value(row, std::min(Index(minibatch_), batch.Size() - row));
+    }
+    value_next(env.States(), env.Init());
+    Finish();
+  }
+
+  /// Values of two critics: v^high = sum_k p_k q_k and v^low = q_o of the samples from `row` on;
+  /// p, q (K, n), o (n).
+  void SetOptionValues(const ConstMatRef& p, const Mat& q, std::span<const int> o, Index row);
+
+  /// Calls use(minibatch) for the shuffled minibatches of all epochs; the last one of an epoch may
+  /// be smaller.
   template <typename Use>
-  void Run(const Batch& rollout, const PpoHyper& hyper, Rng& rng, Use&& use) {
-    for (int epoch = 0; epoch < hyper.epochs; ++epoch) {
-      ForEachMinibatch(order_, hyper.minibatch, rng, [&](std::span<const int> rows) {
-        Batch& batch = int(rows.size()) == hyper.minibatch ? minibatch_ : rest_;
-        Gather(rollout, rows, batch);
-        use(batch);
+  void ForEpochs(Rng& rng, Use&& use) {
+    for (int epoch = 0; epoch < epochs_; ++epoch) {
+      ForEachMinibatch(order_, minibatch_, rng, [&](std::span<const int> rows) {
+        Batch& some = int(rows.size()) == minibatch_ ? whole_ : rest_;
+        Gather(batch, rows, some);
+        use(some);
       });
     }
   }
 
  private:
+  /// r + gamma v(s_last) where an episode ended by its time limit only.
+  void Bootstrap(int t);
+  void Finish();
+
+  const int N_, T_, epochs_, minibatch_;
+  const double gamma_, lambda_, adv_std_eps_;
+  const bool bootstrap_;           // timelimit
+  std::vector<char> not_initial_;  // (N) zeros
+  Transition transition_;
   std::vector<int> order_;
-  Batch minibatch_, rest_;
+  Batch whole_, rest_;
 };
-
-/// How often and how long the options of a rollout were executed.
-class OptionUsage {
- public:
-  explicit OptionUsage(Index K) : executed_(std::size_t(K), 0), begun_(executed_) {}
-
-  void Clear();
-  /// A step with option o, after o_prev or at an episode's start.
-  void Count(int o, int o_prev, bool init);
-  /// Appends each option's share of the steps, then the mean length [steps] of its segments; the
-  /// segment that the rollout's start cuts counts where it began.
-  void Report(std::vector<double>& stats) const;
-  /// The columns of Report.
-  void Names(std::vector<std::string>& names) const;
-
- private:
-  std::vector<double> executed_, begun_;  // (K) steps of each option; its segments
-};
-
-/// Options o of a step of all workers into the rollout at `column`, with o_prev and the flags; they
-/// are counted and become o_prev.
-void RecordOptions(Index column, std::span<const int> o, std::span<const char> init,
-                   std::vector<int>& o_prev, Batch& rollout, OptionUsage& usage);
-
-/// `activation` of a method's numbers, tanh or relu.
-Activation ReadActivation(const Settings& settings);
-
-/// Scratch matrices by batch width, so that the widths in use (workers, minibatch, a last smaller
-/// minibatch) each keep theirs and nothing is resized after their first use.
-template <typename Cache>
-class CacheByWidth {
- public:
-  Cache& operator()(Index width) {
-    std::unique_ptr<Cache>& cache = caches_[width];
-    if (!cache) cache = std::make_unique<Cache>();
-    return *cache;
-  }
-
- private:
-  std::map<Index, std::unique_ptr<Cache>> caches_;
-};
-
-/// Calls use(start, n) for consecutive column blocks of at most `width` that cover 0..total-1.
-template <typename Use>
-void ForEachBlock(Index total, Index width, Use&& use) {
-  for (Index start = 0; start < total; start += width) use(start, std::min(width, total - start));
-}
 
 }  // namespace o2v

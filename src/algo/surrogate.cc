@@ -1,6 +1,10 @@
 #include "algo/surrogate.h"
 
+#include <algorithm>
+
+#include "algo/option_policy.h"
 #include "base/check.h"
+#include "dist/diag_gaussian.h"
 
 namespace o2v {
 
@@ -36,30 +40,90 @@ void ValueLoss(const Vec& v, const Vec& ret, LossTerms& terms, Vec& dv) {
   dv *= scale;
 }
 
+// ---- With one network an option -----------------------------------------------------------------
+
+void SampleAction(const OptionPolicies& policy, const ConstMatRef& s, std::span<const int> o,
+                  Rng& rng, Mat& a, ActionCache& c) {
+  policy.ForwardOne(s, o, c.policy);
+  SampleGaussian(c.policy.nets.out, c.policy.sigma, rng, a);
+  GaussianLogProb(a, c.policy.nets.out, c.policy.sigma, c.logp);
+}
+
+void ActionLogProb(OptionPolicies& policy, const Batch& batch, ActionCache& c) {
+  policy.MakeSigma();
+  policy.ForwardOne(batch.s, batch.o, c.policy);
+  GaussianLogProb(batch.a, c.policy.nets.out, c.policy.sigma, c.logp);
+}
+
+void ActionSurrogate(OptionPolicies& policy, const Batch& batch, Fidelity density_log_eps,
+                     double clip, LossTerms& terms, ActionCache& c) {
+  LogDensity(density_log_eps, c.logp, c.slope);
+  ClippedSurrogate(c.logp, batch.low.logp_old, batch.low.adv_hat, clip, terms, c.dlogp);
+  c.dlogp.array() *= c.slope.array();
+  GaussianLogProbGrad(batch.a, c.policy.nets.out, c.policy.sigma, c.dlogp, c.policy.nets.dout,
+                      c.policy.dsigma);
+  policy.Backward(batch.s, batch.o, c.policy);
+}
+
+void EntryValues(const Net& critic, const ConstMatRef& s, std::span<const int> k, Net::Cache& c,
+                 double* v) {
+  critic.Forward(s, c);
+  for (Index b = 0; b < s.cols(); ++b) v[b] = double(c.out(k[std::size_t(b)], b));
+}
+
+void EntryValueLoss(Net& critic, const ConstMatRef& s, std::span<const int> k, const Vec& ret,
+                    LossTerms& terms, ValueCache& c) {
+  const Index B = s.cols();
+  critic.Forward(s, c.critic);
+  c.v.resize(B);
+  for (Index b = 0; b < B; ++b) c.v(b) = c.critic.out(k[std::size_t(b)], b);
+  ValueLoss(c.v, ret, terms, c.dv);
+  c.critic.dout.setZero(c.critic.out.rows(), B);
+  for (Index b = 0; b < B; ++b) c.critic.dout(k[std::size_t(b)], b) = c.dv(b);
+  critic.Backward(s, c.critic);
+}
+
+// ---- Statistics ---------------------------------------------------------------------------------
+
+namespace {
+
+LossColumns AllColumns(const LossColumns& more) {
+  LossColumns columns = {{"loss", &LossTerms::total},
+                         {"surrogate", &LossTerms::surrogate},
+                         {"value_loss", &LossTerms::value},
+                         {"entropy", &LossTerms::entropy},
+                         {"kl", &LossTerms::kl},
+                         {"clip_fraction", &LossTerms::clip_fraction}};
+  columns.insert(columns.end(), more.begin(), more.end());
+  return columns;
+}
+
+}  // namespace
+
+LossMeans::LossMeans(const LossColumns& more)
+    : columns_(AllColumns(more)), sums_(columns_.size(), 0) {}
+
+void LossMeans::Clear() {
+  std::fill(sums_.begin(), sums_.end(), 0);
+  grad_norm_ = 0;
+  n_ = 0;
+}
+
 void LossMeans::Add(const LossTerms& terms, double grad_norm) {
-  sum_.total += terms.total;
-  sum_.surrogate += terms.surrogate;
-  sum_.value += terms.value;
-  sum_.entropy += terms.entropy;
-  sum_.kl += terms.kl;
-  sum_.clip_fraction += terms.clip_fraction;
+  for (std::size_t i = 0; i < sums_.size(); ++i) sums_[i] += terms.*columns_[i].second;
   grad_norm_ += grad_norm;
   ++n_;
 }
 
 void LossMeans::Report(std::vector<double>& stats) const {
-  const double n = n_;
-  for (const double x : {sum_.total, sum_.surrogate, sum_.value, sum_.entropy, sum_.kl,
-                         sum_.clip_fraction, grad_norm_}) {
-    stats.push_back(x / n);
-  }
+  for (const double sum : sums_) stats.push_back(sum / n_);
+  stats.push_back(grad_norm_ / n_);
 }
 
-void LossMeans::Names(const std::string& stage, std::vector<std::string>& names) {
-  for (const char* term :
-       {"loss", "surrogate", "value_loss", "entropy", "kl", "clip_fraction", "grad_norm"}) {
-    names.push_back(std::string(term) + "_" + stage);
-  }
+void LossMeans::Names(const std::string& stage, std::vector<std::string>& names,
+                      const LossColumns& more) {
+  for (const auto& [name, term] : AllColumns(more)) names.push_back(name + "_" + stage);
+  names.push_back("grad_norm_" + stage);
 }
 
 }  // namespace o2v

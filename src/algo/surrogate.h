@@ -1,7 +1,13 @@
 #pragma once
-// Losses that the PPO-type methods share.
+// Losses that the methods share.
+
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "algo/algorithm.h"
+#include "algo/option_nets.h"
 
 namespace o2v {
 
@@ -16,18 +22,63 @@ void ClippedSurrogate(const Vec& logp, const Vec& logp_old, const Vec& adv_hat, 
 /// 1/2 mean (v - ret)^2 -> terms.value and dv (B) = (v - ret) / B.
 void ValueLoss(const Vec& v, const Vec& ret, LossTerms& terms, Vec& dv);
 
+// ---- With one network an option -----------------------------------------------------------------
+
+/// What acting by options o, or a loss on it, leaves behind.
+struct ActionCache {
+  OptionPolicies::Cache policy;
+  Vec logp, dlogp, slope;  // (B) ln pi_o(a | s), its adjoint, its slope under density_log_eps
+};
+
+/// s (S, N), o (N) -> a (A, N) ~ pi_o and c.logp. The sigmas have been made.
+void SampleAction(const OptionPolicies& policy, const ConstMatRef& s, std::span<const int> o,
+                  Rng& rng, Mat& a, ActionCache& c);
+
+/// The sigmas and c.logp of a batch.
+void ActionLogProb(OptionPolicies& policy, const Batch& batch, ActionCache& c);
+
+/// Clipped surrogate of the density e^{c.logp} on batch.low under density_log_eps. c.logp is what
+/// ActionLogProb left, with the logarithms of other factors added or not; c.dlogp becomes its
+/// adjoint. Adds to the gradients of the policies.
+void ActionSurrogate(OptionPolicies& policy, const Batch& batch, Fidelity density_log_eps,
+                     double clip, LossTerms& terms, ActionCache& c);
+
+/// v[b] = x_k of the critic's outputs x at s (S, B), k (B).
+void EntryValues(const Net& critic, const ConstMatRef& s, std::span<const int> k, Net::Cache& c,
+                 double* v);
+
+/// What a value loss leaves behind.
+struct ValueCache {
+  Net::Cache critic;
+  Vec v, dv;  // (B)
+};
+
+/// 1/2 mean (x_k - ret)^2 of the critic's outputs x at s (S, B), k (B). Adds to the gradients.
+void EntryValueLoss(Net& critic, const ConstMatRef& s, std::span<const int> k, const Vec& ret,
+                    LossTerms& terms, ValueCache& c);
+
+// ---- Statistics ---------------------------------------------------------------------------------
+
+/// Columns of updates.csv: a name and the term that it shows.
+using LossColumns = std::vector<std::pair<std::string, double LossTerms::*>>;
+
 /// Mean of the terms of a stage's minibatches.
 class LossMeans {
  public:
-  void Clear() { *this = LossMeans(); }
+  /// more: columns beside those of all methods.
+  explicit LossMeans(const LossColumns& more = {});
+  void Clear();
   void Add(const LossTerms& terms, double grad_norm);
-  /// Appends total, surrogate, value, entropy, kl, clip_fraction, grad_norm, in the order of Names.
+  /// Appends total, surrogate, value, entropy, kl, clip_fraction, the other columns and grad_norm,
+  /// in the order of Names.
   void Report(std::vector<double>& stats) const;
   /// The columns of `stage`.
-  static void Names(const std::string& stage, std::vector<std::string>& names);
+  static void Names(const std::string& stage, std::vector<std::string>& names,
+                    const LossColumns& more = {});
 
  private:
-  LossTerms sum_;
+  LossColumns columns_;
+  std::vector<double> sums_;
   double grad_norm_ = 0;
   int n_ = 0;
 };

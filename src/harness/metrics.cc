@@ -48,6 +48,8 @@ void CsvLog::Resume() {
   const std::string_view kept(text.data(), static_cast<std::size_t>(bytes_));
   Check(std::bit_cast<std::int64_t>(Fnv1a(kept)) == hash_, path_.string(), ": the first ", bytes_,
         " bytes are not those that were there when the checkpoint was written");
+  Check(kept.starts_with(header_ + "\n"), path_.string(), ": its columns are not ", header_,
+        ": it was begun by another version of the program");
   std::filesystem::resize_file(path_, static_cast<std::uintmax_t>(bytes_));
   out_.open(path_, std::ios::binary | std::ios::app);
   Check(out_.is_open(), path_.string(), ": cannot be opened for writing");

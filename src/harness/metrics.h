@@ -23,7 +23,7 @@ class CsvLog {
   /// Starts an empty file: the header only.
   void Create();
   /// Cuts the file to the state last seen by Visit and appends from there. Throws Error when the
-  /// file is shorter or its beginning has changed.
+  /// file is shorter, its beginning has changed, or its columns are other ones.
   void Resume();
   /// Appends a row of ready cells.
   void Row(const std::vector<std::string>& cells);

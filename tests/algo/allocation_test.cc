@@ -64,6 +64,27 @@ TEST_P(TrainingAllocations, DoNotHappenAfterTheFirstUpdate) {
   }
 }
 
+/// Allocations of a loss of IOPG on an episode of n steps.
+long AllocationsOfEpisode(Algorithm& iopg, int n) {
+  Rng rng(1, "batch");
+  const Batch episode = RandomBatch(5, 3, iopg.NumOptions(), n, rng);
+  const long before = g_allocations;
+  iopg.Loss(0, episode, nullptr);
+  return g_allocations - before;
+}
+
+TEST(TrainingAllocations, OfIopgGrowOnceWithALongerEpisode) {
+  // The networks pass 64 steps at a time.
+  EnvSpec spec = Sizes(5, 3);
+  spec.time_limit = 100;
+  const auto iopg = MakeRunAlgorithm(SmallConfig("iopg", Fidelity::kPaper), spec);
+  EXPECT_GT(AllocationsOfEpisode(*iopg, 64), 10);
+  const long least = AllocationsOfEpisode(*iopg, 64);
+  EXPECT_EQ(AllocationsOfEpisode(*iopg, 30), least);
+  EXPECT_GT(AllocationsOfEpisode(*iopg, 65), least + 10);
+  EXPECT_EQ(AllocationsOfEpisode(*iopg, 100), least);
+}
+
 INSTANTIATE_TEST_SUITE_P(Methods, TrainingAllocations, testing::ValuesIn(MethodIds()),
                          [](const auto& info) { return info.param; });
 

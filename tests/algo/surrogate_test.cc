@@ -89,5 +89,26 @@ TEST(LossMeans, AverageTheMinibatches) {
   EXPECT_EQ(stats.back(), 3);
 }
 
+TEST(LossMeans, HaveTheColumnsOfAMethodBesideTheirOwn) {
+  const LossColumns more = {{"master", &LossTerms::master},
+                            {"termination", &LossTerms::termination}};
+  LossMeans means(more);
+  LossTerms terms;
+  terms.master = 2;
+  terms.termination = 7;
+  means.Add(terms, 1);
+  means.Clear();
+  terms.termination = 8;
+  means.Add(terms, 1);
+  std::vector<double> stats;
+  std::vector<std::string> names;
+  means.Report(stats);
+  LossMeans::Names("all", names, more);
+  EXPECT_EQ(names, (std::vector<std::string>{"loss_all", "surrogate_all", "value_loss_all",
+                                             "entropy_all", "kl_all", "clip_fraction_all",
+                                             "master_all", "termination_all", "grad_norm_all"}));
+  EXPECT_EQ(stats, (std::vector<double>{0, 0, 0, 0, 0, 0, 2, 8, 1}));
+}
+
 }  // namespace
 }  // namespace o2v

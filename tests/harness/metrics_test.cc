@@ -40,8 +40,8 @@ class Logs : public testing::Test {
     log.Row({"2", "0.25"});
     log.Flush();
   }
-  void Resume() {
-    CsvLog log(path_, "step,x");
+  void Resume(const std::string& header = "step,x") {
+    CsvLog log(path_, header);
     checkpoint_.StartWriting();
     log.Visit(checkpoint_, "log");
     log.Resume();
@@ -63,6 +63,12 @@ TEST_F(Logs, AreCutToTheCheckpointAndGoOn) {
 TEST_F(Logs, ThatAreShorterThanTheCheckpointAreRefused) {
   WriteFileAtomically(path_, "step,x\n1,0.");
   EXPECT_THROW(Resume(), Error);
+}
+
+TEST_F(Logs, OfOtherColumnsAreRefusedAndLeftAlone) {
+  const std::string before = ReadFile(path_);
+  EXPECT_THROW(Resume("step,x,y"), Error);
+  EXPECT_EQ(ReadFile(path_), before);
 }
 
 TEST_F(Logs, ThatHaveChangedAreRefusedAndLeftAlone) {

@@ -45,7 +45,7 @@ TEST(Orthogonal, HasNoPreferredSign) {
     Orthogonal(W, 1, rng);
     for (Index k = 0; k < 2; ++k) positive[k] += W(k, k) > 0;
   }
-  for (const int count : positive) EXPECT_NEAR(count, n / 2, 5 * std::sqrt(n / 4.0));
+  for (const int count : positive) EXPECT_NEAR(count, n / 2.0, 5 * std::sqrt(n / 4.0));
 }
 
 TEST(XavierUniform, FillsItsInterval) {

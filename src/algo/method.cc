@@ -1,0 +1,134 @@
+#include "algo/method.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace o2v {
+
+// ---- Statistics ---------------------------------------------------------------------------------
+
+void OptionUsage::Clear() {
+  std::fill(executed_.begin(), executed_.end(), 0);
+  std::fill(begun_.begin(), begun_.end(), 0);
+}
+
+void OptionUsage::Count(int o, int o_prev, bool init) {
+  executed_[std::size_t(o)] += 1;
+  begun_[std::size_t(o)] += init || o != o_prev;
+}
+
+void OptionUsage::Report(std::vector<double>& stats) const {
+  const double steps = std::accumulate(executed_.begin(), executed_.end(), 0.0);
+  for (const double n : executed_) stats.push_back(n / steps);
+  for (std::size_t k = 0; k < executed_.size(); ++k) {
+    stats.push_back(executed_[k] / std::max(1.0, begun_[k]));
+  }
+}
+
+void OptionUsage::Names(std::vector<std::string>& names) const {
+  for (std::size_t k = 0; k < executed_.size(); ++k) names.push_back("usage_" + std::to_string(k));
+  for (std::size_t k = 0; k < executed_.size(); ++k) {
+    names.push_back("duration_" + std::to_string(k) + "_steps");
+  }
+}
+
+void Method::RecordOptions(Index column, std::span<const int> o, std::span<const char> init,
+                           Batch& rollout) {
+  for (std::size_t i = 0; i < o.size(); ++i) {
+    const std::size_t row = std::size_t(column) + i;
+    rollout.o[row] = o[i];
+    rollout.o_prev[row] = o_prev_[i];
+    rollout.init[row] = init[i];
+    usage_.Count(o[i], o_prev_[i], init[i]);
+    o_prev_[i] = o[i];
+  }
+}
+
+void Method::Report(std::vector<double>& stats) {
+  stats.clear();
+  for (LossMeans& means : means_) {
+    means.Report(stats);
+    means.Clear();
+  }
+  usage_.Report(stats);
+  usage_.Clear();
+}
+
+std::vector<std::string> Method::StatNames() const {
+  std::vector<std::string> names;
+  for (const std::string& stage : stages_) LossMeans::Names(stage, names, more_);
+  usage_.Names(names);
+  return names;
+}
+
+// ---- Construction, state, optimiser -------------------------------------------------------------
+
+Method::Method(const AlgorithmInput& in, Index K, std::vector<std::string> stages,
+               const LossColumns& more)
+    : switches_(in.switches),
+      K_(K),
+      N_(in.workers),
+      usage_(K),
+      seed_(in.seed),
+      stages_(std::move(stages)),
+      more_(more),
+      means_(stages_.size(), LossMeans(more)) {}
+
+Rng& Method::NewStream(const std::string& name) {
+  return streams_.emplace_back(name, Rng(seed_, name)).second;
+}
+
+void Method::Assemble(const AlgorithmInput& in, std::vector<Param*> params,
+                      std::initializer_list<Reaches> reaches, OptionPolicies* policy, Net* critic) {
+  policy_ = policy;
+  critic_ = critic;
+  params_ = std::move(params);
+  for (const Reaches& reached : reaches) {
+    std::vector<char>& in_graph = in_graph_.emplace_back();
+    for (const Param* p : params_) in_graph.push_back(reached(p->name));
+  }
+  const Settings& s = *in.hyper;
+  adam_ = std::make_unique<Adam>(
+      params_, Adam::Options{s.Real("learning_rate"), s.Real("adam_beta1"), s.Real("adam_beta2"),
+                             s.Real("adam_eps"), s.Real("clip_norm")});
+}
+
+void Method::Visit(StateVisitor& v) {
+  for (Param* p : params_) v.Matrix(p->name, p->value);
+  adam_->Visit(v);
+  for (auto& [name, rng] : streams_) rng.Visit(v, "rng." + name);
+  if (!o_prev_.empty()) v.Ints("o_prev", o_prev_);
+}
+
+double Method::Step(int stage) {
+  return adam_->Step(in_graph_[std::size_t(stage)], switches_.adam_idle == Fidelity::kPaper
+                                                        ? IdleRule::kSkip
+                                                        : IdleRule::kZeroGradient);
+}
+
+Activation ReadActivation(const Settings& settings) {
+  return settings.Int("activation") == 0 ? Activation::kTanh : Activation::kRelu;
+}
+
+OptionNets MakeOptionNets(const AlgorithmInput& in, OptionNets::CriticHead head, Rng& rng) {
+  return OptionNets(in.hyper->Int("options", 1), in.S, in.A, in.hyper->Int("hidden", 1),
+                    ReadActivation(*in.hyper), head, rng);
+}
+
+// ---- Queries ------------------------------------------------------------------------------------
+
+void Method::ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, Mat& sigma) {
+  OptionPolicies::Cache& c = asked_(s.cols()).policy;
+  policy_->MakeSigma();
+  policy_->ForwardOne(s, o, c);
+  mu = c.nets.out;
+  sigma = c.sigma;
+}
+
+void Method::OptionValues(const Mat& s, const std::vector<int>&, Mat& q) {
+  Net::Cache& c = asked_(s.cols()).critic;
+  critic_->Forward(s, c);
+  q = c.out.topRows(NumOptions());
+}
+
+}  // namespace o2v

@@ -1,0 +1,131 @@
+#pragma once
+// What all methods do alike beside their mathematics.
+
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "algo/algorithm.h"
+#include "algo/option_nets.h"
+#include "algo/surrogate.h"
+#include "nn/activation.h"
+#include "nn/adam.h"
+
+namespace o2v {
+
+/// Scratch matrices by batch width, so that the widths in use (workers, minibatch, a last smaller
+/// minibatch) each keep theirs and nothing is resized after their first use.
+template <typename Cache>
+class CacheByWidth {
+ public:
+  Cache& operator()(Index width) {
+    std::unique_ptr<Cache>& cache = caches_[width];
+    if (!cache) cache = std::make_unique<Cache>();
+    return *cache;
+  }
+
+ private:
+  std::map<Index, std::unique_ptr<Cache>> caches_;
+};
+
+/// How often and how long the options of a rollout were executed.
+class OptionUsage {
+ public:
+  explicit OptionUsage(Index K) : executed_(std::size_t(K), 0), begun_(executed_) {}
+
+  void Clear();
+  /// A step with option o, after o_prev or at an episode's start.
+  void Count(int o, int o_prev, bool init);
+  /// Appends each option's share of the steps, then the mean length [steps] of its segments; the
+  /// segment that the rollout's start cuts counts where it began.
+  void Report(std::vector<double>& stats) const;
+  /// The columns of Report.
+  void Names(std::vector<std::string>& names) const;
+
+ private:
+  std::vector<double> executed_, begun_;  // (K) steps of each option; its segments
+};
+
+/// The thin base of the methods: optimiser, random streams, statistics, saved state, and what most
+/// networks are asked alike. How a method acts (Collect, OptionPolicy) and what it learns (Loss,
+/// Update) is in its own file.
+class Method : public Algorithm {
+ public:
+  /// Parameters, optimiser, random streams and o_prev_.
+  void Visit(StateVisitor& v) override;
+  /// Of each stage the columns of LossMeans, then those of OptionUsage.
+  std::vector<std::string> StatNames() const override;
+
+  std::vector<Param*> Params() override { return params_; }
+  int NumOptions() const override { return int(std::max<Index>(K_, 1)); }
+  /// Of the intra-option policies given to Assemble.
+  void ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, Mat& sigma) override;
+  /// The first K outputs of the critic given to Assemble.
+  void OptionValues(const Mat& s, const std::vector<int>& o, Mat& q) override;
+
+  std::vector<std::string> Stages() const override { return stages_; }
+  double Step(int stage) override;
+  std::vector<char> InGraph(int stage) const override { return in_graph_[std::size_t(stage)]; }
+
+ protected:
+  /// Whether a stage's loss reaches the parameter of this name.
+  using Reaches = std::function<bool(const std::string& name)>;
+  struct Asked {
+    OptionPolicies::Cache policy;
+    Net::Cache critic;
+  };
+
+  /// K = 0: a method without options. more: columns of updates.csv beside those of all methods.
+  Method(const AlgorithmInput& in, Index K, std::vector<std::string> stages = {"all"},
+         const LossColumns& more = {});
+  /// A random stream that is part of the state.
+  Rng& NewStream(const std::string& name);
+  /// Closes construction, when the method's networks exist: pointers to them are kept. `reaches`
+  /// has an entry a stage; a method that answers the queries itself has neither policy nor critic.
+  void Assemble(const AlgorithmInput& in, std::vector<Param*> params,
+                std::initializer_list<Reaches> reaches, OptionPolicies* policy, Net* critic);
+
+  /// A step of the optimiser on the gradients of a loss with these terms.
+  void StepOn(int stage, const LossTerms& terms) { means_[stage].Add(terms, Step(stage)); }
+  /// Loss and step on a batch.
+  void Learn(int stage, const Batch& batch) { StepOn(stage, Loss(stage, batch, nullptr)); }
+  /// Parameter i, whose gradient must be zero from now on, is never stepped again.
+  void Hold(std::size_t i) { adam_->Freeze(i); }
+  /// Options o of a step of all workers into `rollout` at `column`, with o_prev_ and the flags;
+  /// they are counted and become o_prev_.
+  void RecordOptions(Index column, std::span<const int> o, std::span<const char> init,
+                     Batch& rollout);
+  /// The numbers of StatNames() of all steps since the last call.
+  void Report(std::vector<double>& stats);
+
+  const Switches switches_;
+  const Index K_;
+  const int N_;  // workers
+  std::vector<Param*> params_;
+  std::vector<std::vector<char>> in_graph_;  // of each stage
+  std::vector<int> o_prev_;                  // (N), empty where a method keeps them elsewhere
+  OptionUsage usage_;
+  CacheByWidth<Asked> asked_;         // scratch of the queries
+  OptionPolicies* policy_ = nullptr;  // the method's
+  Net* critic_ = nullptr;
+
+ private:
+  const std::uint64_t seed_;
+  const std::vector<std::string> stages_;
+  const LossColumns more_;
+  std::deque<std::pair<std::string, Rng>> streams_;  // which stay where they are
+  std::unique_ptr<Adam> adam_;
+  std::vector<LossMeans> means_;  // of each stage
+};
+
+/// `activation` of a method's numbers, tanh or relu.
+Activation ReadActivation(const Settings& settings);
+
+/// The network of spec 2.3 in the sizes of a method's numbers.
+OptionNets MakeOptionNets(const AlgorithmInput& in, OptionNets::CriticHead head, Rng& rng);
+
+}  // namespace o2v
