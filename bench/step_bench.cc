@@ -95,12 +95,14 @@ void StepCost(benchmark::State& state, const std::string& task, const std::strin
   std::vector<Cost> costs;
   for (auto _ : state) {
     Cost cost = train();
+    state.PauseTiming();
     const double steps = double(cost.steps);
     const double adam_entries =
         AdamEntriesPerStep(config, S, A, steps / double(std::max<std::size_t>(cost.episodes, 1)));
     cost.products = steps * ProductSecondsPerStep(products);
     cost.adam = steps * AdamSecondsPerEntry() * adam_entries;
     costs.push_back(cost);
+    state.ResumeTiming();
   }
   const auto median = costs.begin() + std::ptrdiff_t(costs.size() / 2);
   std::ranges::nth_element(costs, median, {}, &Cost::Ratio);

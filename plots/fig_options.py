@@ -53,10 +53,10 @@ def _figure(cells: Mapping[Key, Cell], fidelity: str) -> Drawing:
         for panel in unused:
             panel.set_visible(False)
     figure.supxlabel("environment steps [millions]\nband: mean $\\pm$ one standard deviation over "
-                     "the n seeds", fontsize=8)
+                     "the n seeds, of durations no lower than one step", fontsize=8)
     ranks = [(Line2D([], [], color=LOOKS["option2vec"].color, linestyle=line),
               f"option, rank {rank} by share") for rank, line in enumerate(RANKS, 1)]
-    legend_above(figure, methods, *ranks, ncols=4)
+    legend_above(figure, methods, *ranks, ncols=3)
     return Drawing(name, f"Usage of Option2Vec's options and mean duration of an "
                    f"option over training, {fidelity}.", figure)
 
@@ -73,7 +73,7 @@ def _usage(panel: Axes, runs: Sequence[Run]) -> None:
 def _duration(panel: Axes, method: str, runs: Sequence[Run]) -> None:
     step, durations = _aligned(runs, [mean_duration(run) for run in runs])
     durations = np.ma.masked_invalid(durations)
-    _band(panel, step, durations, LOOKS[method].color, 0.15)
+    _band(panel, step, durations, LOOKS[method].color, 0.15, least=1)
     panel.plot(step, durations.mean(axis=0), **line_of(method, len(step)))
 
 
@@ -84,9 +84,11 @@ def _aligned(runs: Sequence[Run], curves: Sequence[np.ndarray]) -> tuple[np.ndar
             np.array([thin(curve[..., -rows:]) for curve in curves]))
 
 
-def _band(panel: Axes, step: np.ndarray, x: np.ndarray, color: str, alpha: float) -> None:
+def _band(panel: Axes, step: np.ndarray, x: np.ndarray, color: str, alpha: float,
+          least: float = 0) -> None:
     mean, std = x.mean(axis=0), x.std(axis=0)
-    panel.fill_between(step, mean - std, mean + std, color=color, alpha=alpha, linewidth=0)
+    panel.fill_between(step, np.maximum(mean - std, least), mean + std, color=color, alpha=alpha,
+                       linewidth=0)
 
 
 if __name__ == "__main__":

@@ -238,6 +238,7 @@ std::string ToWord(std::string_view key, const Scalar& scalar) {
 
 // ---- Runs
 
+/// The switches that the run reads.
 std::vector<std::string> SwitchNames(const RunConfig& config) {
   std::vector<std::string> names;
   for (const SwitchInfo& info : SwitchRegistry()) {
@@ -245,6 +246,8 @@ std::vector<std::string> SwitchNames(const RunConfig& config) {
   }
   return names;
 }
+
+/// A run of these tasks and this method, otherwise empty.
 RunConfig Named(const Scope& scope) {
   RunConfig config;
   config.task = scope.tasks;

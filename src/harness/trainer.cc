@@ -205,9 +205,11 @@ class Run {
     const fs::path path = Checkpoint();
     if (fs::exists(path)) {
       if (parts_.tasks > 1) {
+        // LoadCheckpoint wants the simulators of the task that the file was written on.
         const Metadata of_file = ReadMetadata(path);
         const auto steps = of_file.find("total_steps");
-        task_ = TaskAt(steps == of_file.end() ? 0 : std::atoll(steps->second.c_str()));
+        Check(steps != of_file.end(), path.string(), ": no total_steps in its metadata");
+        task_ = TaskAt(std::stoll(steps->second));
         env_.ReplaceEnvs(MakeTask(task_));
       }
       const Metadata metadata = LoadCheckpoint(path, *algorithm_, Walk());
