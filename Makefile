@@ -46,21 +46,28 @@ bench: deps  ## costs of layers and environment steps beside the bound; writes r
 	@$(COMPILE) --target o2v_bench
 	@build/$(PRESET)/bench/o2v_bench --benchmark_out=results/bench.json --benchmark_out_format=json
 
-SUITE ?= quick
-LISTS := $(if $(FIDELITY),--fidelity $(FIDELITY)) $(if $(SEEDS),--seeds $(SEEDS)) \
-         $(if $(TASKS),--tasks $(TASKS)) $(if $(ALGOS),--algos $(ALGOS))
-reproduce: deps  ## trains and tabulates SUITE=quick (FIDELITY= SEEDS= TASKS= ALGOS= JOBS=)
-	@$(COMPILE) --target option2vec
-	@$(O2V) jobs $(SUITE) $(LISTS) | xargs -P $(JOBS) -d '\n' -r -n 1 scripts/run_job.sh
-	@$(O2V) summary results/$(basename $(notdir $(SUITE)))
+SUITE    ?= paper
+FIDELITY ?= $(if $(filter ci,$(SUITE)),both,paper)
+comma    := ,
+SUITES   := $(if $(filter paper,$(SUITE)),single_task transfer,$(SUITE))
+GRID     := $(SUITES) --fidelity $(if $(filter both,$(FIDELITY)),paper$(comma)released,$(FIDELITY)) \
+            $(if $(SEEDS),--seeds $(SEEDS)) $(if $(TASKS),--tasks $(TASKS)) $(if $(ALGOS),--algos $(ALGOS))
+reproduce: deps  ## reruns the paper, or SUITE=quick (FIDELITY= SEEDS= TASKS= ALGOS= JOBS=)
+	@$(COMPILE) --target option2vec $(if $(filter paper,$(SUITE)),gradcheck)
+	@if [ $(SUITE) = paper ]; then build/$(PRESET)/tests/gradcheck | tail -n 1; fi
+	@$(O2V) progress $(GRID) --at-once $(JOBS)
+	@$(O2V) jobs $(GRID) | \
+	    GRID="$(GRID) --at-once $(JOBS)" xargs -P $(JOBS) -d '\n' -r -n 1 scripts/run_job.sh
+	@$(O2V) summary $$(ls -d $(foreach suite,$(SUITES),results/$(basename $(notdir $(suite)))) 2> /dev/null)
+	@if [ $(SUITE) = paper ]; then $(MAKE) --no-print-directory report; fi
 
 # Debian's, which has Debian's packages; without caches beside the sources.
 PYTHON := /usr/bin/python3 -B
 CHOICE  = $(addprefix --experiment ,$(EXPERIMENTS))
 report: deps  ## tables, claims, figures: results/REPORT.md, report.html (EXPERIMENTS=ci: in results/ci)
 	@$(COMPILE) --target option2vec
-	@$(O2V) params --csv > results/params.csv
-	@$(O2V) list switches > results/switches.txt
+	@$(O2V) params --csv > results/params.csv.new && mv results/params.csv.new results/params.csv
+	@$(O2V) list switches > results/switches.txt.new && mv results/switches.txt.new results/switches.txt
 	@$(PYTHON) -m plots.report $(CHOICE) $(if $(CHOICE),--out results/$(firstword $(EXPERIMENTS)))
 
 plots: deps  ## the figures alone: plots/*.svg and *.png

@@ -68,7 +68,6 @@ void StepCost(benchmark::State& state, const std::string& task, const std::strin
              config.workers, config.seed);
   const auto learner = MakeRunAlgorithm(config, env.Spec());
   std::vector<Episode> episodes;
-  std::vector<double> stats;
   const auto train = [&] {
     constexpr std::int64_t kSteps = 2048;  // of one rollout; many of OC and of IOPG's episodes
     const std::int64_t first = env.TotalSteps();
@@ -79,7 +78,7 @@ void StepCost(benchmark::State& state, const std::string& task, const std::strin
       const auto start = Clock::now();
       learner->Collect(env, episodes);
       cost.collect += SecondsSince(start);
-      learner->Update(stats);
+      learner->Update();
       cost.total += SecondsSince(start);
       cost.steps = env.TotalSteps() - first;
     }

@@ -42,7 +42,7 @@ def build(results: Path, experiments: Sequence[str] | None = None
     sources = {f: our_samples(cells, f) for f in FIDELITIES}
     sources["authors"] = author_samples(results / "reference")
     params, gradcheck, theory = (read_rows(results, n) for n in ("params", "gradcheck", "theory"))
-    effects = {path: effects for path, (_, effects) in read_interpretations(results).items()}
+    effects = {path: found.effects for path, found in read_interpretations(results).items()}
     evidence = [Evidence(f, sources[f], parameter_counts(params, f), gradcheck, theory,
                          {p: e for p, e in effects.items() if p.parts[-4] == f})
                 for f in FIDELITIES]

@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -74,18 +75,32 @@ def read_switches(results: Path) -> Rows:
     return rows[1:]
 
 
-def read_interpretations(results: Path) -> Mapping[Path, tuple[np.ndarray, np.ndarray]]:
-    """Embedding matrices W_o (D, K) and effects (D, A) by file; format: plots/fig_embedding.py."""
+@dataclass(frozen=True)
+class Interpretation:
+    """Of a run, a row an embedding dimension; columns: plots/fig_embedding.py."""
+    W_o: np.ndarray  # (D, K)
+    effects: np.ndarray  # (D, A)
+    perturbed: np.ndarray  # (D, A)
+    delta: float
+
+
+def read_interpretations(results: Path) -> Mapping[Path, Interpretation]:
+    """By file; all dimensions 0, 1, ..., and the same delta in every row."""
     found = {}
     for path in sorted((results / "interpret").glob("*/*/*/seed-*.csv")):
         with path.open(encoding="utf-8") as file:
             header = file.readline().rstrip("\n").split(",")
         K = sum(name.startswith("embedding_") for name in header)
         A = sum(name.startswith("effect_") for name in header)
-        columns: Columns = ({"dimension": int} | {f"embedding_{k}": finite for k in range(K)}
-                            | {f"effect_{a}": finite for a in range(A)})
+        names = [f"embedding_{k}" for k in range(K)] + [
+            f"{quantity}_{a}" for quantity in ("effect", "perturbed") for a in range(A)]
+        columns: Columns = {"dimension": int, **dict.fromkeys(names + ["delta"], finite)}
         table = np.array([list(row.values()) for row in read_table(path, columns)], dtype=float)
         if not len(table) or K == 0 or A == 0 or (table[:, 0] != np.arange(len(table))).any():
-            raise DamagedFile(f"{path}:1: not one row a dimension 0, 1, ... with both quantities")
-        found[path] = (table[:, 1:1 + K], table[:, 1 + K:])
+            raise DamagedFile(f"{path}:1: not one row a dimension 0, 1, ... with all quantities")
+        delta = float(table[0, -1])
+        if delta <= 0 or (table[:, -1] != delta).any():
+            raise DamagedFile(f"{path}:1: delta is not the same positive number in every row")
+        W_o, effects, perturbed = np.split(table[:, 1:-1], (K, K + A), axis=1)
+        found[path] = Interpretation(W_o, effects, perturbed, delta)
     return found

@@ -25,7 +25,7 @@ class AhpPpo final : public Method {
   explicit AhpPpo(const AlgorithmInput& in);
 
   void Collect(VecEnv& env, std::vector<Episode>& episodes) override;
-  void Update(std::vector<double>& stats) override;
+  const std::vector<Ratio>& Update() override;
   void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
                     Mat& P) override;
   LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) override;
@@ -66,8 +66,7 @@ AhpPpo::AhpPpo(const AlgorithmInput& in)
     : Method(in, in.hyper->Int("options", 1)),
       clip_(in.hyper->Real("ratio_clip")),
       rollout_(in, /*critics=*/1) {
-  Rng init(in.seed, "init");
-  nets_ = MakeOptionNets(in, OptionNets::CriticHead::kU, init);
+  nets_ = MakeOptionNets(in, OptionNets::CriticHead::kU, init_);
   const auto reached = [](const std::string& name) { return !name.starts_with("critic.q."); };
   Assemble(in, nets_.Params(), {reached}, &nets_.policy, &nets_.critic);
   rollout_.batch.stop.assign(std::size_t(rollout_.batch.Size()), 0);
@@ -175,9 +174,9 @@ LossTerms AhpPpo::Loss(int, const Batch& batch, const FixedDraws*) {
   return terms;
 }
 
-void AhpPpo::Update(std::vector<double>& stats) {
+const std::vector<Ratio>& AhpPpo::Update() {
   rollout_.ForEpochs(shuffle_rng_, [&](const Batch& batch) { Learn(0, batch); });
-  Report(stats);
+  return Report();
 }
 
 /// P(o | s, o') = (1 - beta_{o'}) delta_{o o'} + beta_{o'} pi_o, as b and the candidate are drawn.

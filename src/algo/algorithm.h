@@ -1,6 +1,7 @@
 #pragma once
 // What a learning method is to everybody else.
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "algo/switches.h"
+#include "base/check.h"
 #include "base/settings.h"
 #include "base/state.h"
 #include "nn/param.h"
@@ -24,7 +26,8 @@ struct AlgorithmInput {
   int time_limit = 1000;            // [steps] of the task's episodes; gym's usual limit
   const Settings* hyper = nullptr;  // hyper-parameters: keys of paper_configs/algo/<method>.toml
   Switches switches;
-  std::uint64_t seed = 0;  // of all its random streams
+  std::uint64_t seed = 0;    // of all its random streams
+  bool draw_weights = true;  // false: they stay zero, where the networks are only to be counted
 };
 
 /// Terms of a stage's loss on one batch, as optimised: total is what the gradients belong to.
@@ -40,6 +43,14 @@ struct LossTerms {
   double clip_fraction = 0;  // share of samples with a ratio outside [1-c, 1+c]
 };
 
+/// A statistic of an update, as what it is made of: a sum over n minibatches, steps or executions
+/// of an option. Those of several updates are added up, each part for itself. Where n is 0 (no
+/// execution began) the value is the sum.
+struct Ratio {
+  double sum = 0, n = 0;
+  double Value() const { return sum / std::max(1.0, n); }
+};
+
 /// Random choices inside a loss, given instead of drawn. Used by gradient checks and oracles.
 struct FixedDraws {
   std::vector<int> o;        // (B) options fed to action net and critic; empty: drawn
@@ -53,8 +64,8 @@ class Algorithm {
 
   /// One rollout. Appends the episodes that ended.
   virtual void Collect(VecEnv& env, std::vector<Episode>& episodes) = 0;
-  /// All epochs over it. `stats` gets one number for each of StatNames().
-  virtual void Update(std::vector<double>& stats) = 0;
+  /// All epochs over it. Returns a statistic for each of StatNames().
+  virtual const std::vector<Ratio>& Update() = 0;
   /// Columns of updates.csv after `step`.
   virtual std::vector<std::string> StatNames() const = 0;
 
@@ -78,6 +89,15 @@ class Algorithm {
   virtual void ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, Mat& sigma) = 0;
   /// s (S, B), o (B) the option that the critic is fed -> q (K, B).
   virtual void OptionValues(const Mat& s, const std::vector<int>& o, Mat& q) = 0;
+
+  /// W_o (D, K), whose column k is the embedding o_hat of option k, as one of Params(); null for a
+  /// method whose options have none.
+  virtual Param* Embedding() { return nullptr; }
+  /// s (S, B), o (B) -> J (A, D), mean over the samples of d mu / d o_hat at the embedding of the
+  /// option given. Throws Error without an embedding.
+  virtual void MeanJacobian(const Mat&, const std::vector<int>&, MatD&) {
+    throw Error("the method's options have no embedding");
+  }
 
   // ---- Parts of Update, one by one.
 

@@ -1,7 +1,6 @@
 #include "algo/double_actor_critic.h"
 #include "base/check.h"
 #include "dist/categorical.h"
-#include "nn/init.h"
 #include "nn/layer_norm.h"
 
 namespace o2v {
@@ -59,24 +58,23 @@ class DacOneStep final : public DoubleActorCritic {
 };
 
 DacOneStep::DacOneStep(const AlgorithmInput& in) : DoubleActorCritic(in) {
-  Rng init(in.seed, "init");
   const Index h = in.hyper->Int("hidden", 1), h_y = in.hyper->Int("ynet_hidden", 1);
   const Activation g = ReadActivation(*in.hyper);
   const std::string name = NumericIndex() ? "master" : "policy";
   const Index n_in = in.S + (NumericIndex() ? 1 : K_);
-  policy_net_ = Net(name + ".body", name + ".head", n_in, h, K_, g, init);
+  policy_net_ = Net(name + ".body", name + ".head", n_in, h, K_, g, init_);
   if (NumericIndex()) norm_ = LayerNorm(name + ".ln", n_in);
   if (Swapped()) {
     y0_ = Linear("ynet.0", in.S, h_y);
     y1_ = Linear("ynet.1", h_y, K_);
-    XavierUniform(y0_.W.value, init);
-    XavierUniform(y1_.W.value, init);
+    init_.XavierUniform(y0_.W.value);
+    init_.XavierUniform(y1_.W.value);
   }
-  critic_net_ = Net("critic.body", "critic.q", in.S, h, K_, g, init);
-  policies_ = OptionPolicies(K_, in.S, in.A, h, g, init);
+  critic_net_ = Net("critic.body", "critic.q", in.S, h, K_, g, init_);
+  policies_ = OptionPolicies(K_, in.S, in.A, h, g, init_);
   if (NumericIndex() && Swapped() && Unnormalised()) {
     unused_head_.emplace_back("critic.u", h, K_ + 1);
-    unused_beta_ = OptionBank("beta", K_, in.S, h, 1, g, init);
+    unused_beta_ = OptionBank("beta", K_, in.S, h, 1, g, init_);
   }
   std::vector<Param*> params = policy_net_.Params();
   if (NumericIndex()) Append(params, norm_.Params());

@@ -13,8 +13,7 @@ namespace {
 class DacPpo final : public DoubleActorCritic {
  public:
   explicit DacPpo(const AlgorithmInput& in) : DoubleActorCritic(in) {
-    Rng init(in.seed, "init");
-    nets_ = MakeOptionNets(in, OptionNets::CriticHead::kQ, init);
+    nets_ = MakeOptionNets(in, OptionNets::CriticHead::kQ, init_);
     const auto in_option_policy = [](const std::string& name) {
       return name.starts_with("master.") || name.find(".beta.") != std::string::npos;
     };

@@ -102,12 +102,12 @@ LossTerms DoubleActorCritic::LowLoss(const Batch& batch) {
   return terms;
 }
 
-void DoubleActorCritic::Update(std::vector<double>& stats) {
+const std::vector<Ratio>& DoubleActorCritic::Update() {
   const int first = order_rng_.Uniform() < 0.5 ? kHigh : kLow;  // fair coin; spec 4.6 (f)
   for (const int stage : {first, 1 - first}) {
     rollout_.ForEpochs(shuffle_rng_, [&](const Batch& batch) { Learn(stage, batch); });
   }
-  Report(stats);
+  return Report();
 }
 
 void DoubleActorCritic::OptionPolicy(const Mat& s, const std::vector<int>& o_prev,

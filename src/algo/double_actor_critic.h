@@ -19,7 +19,7 @@ namespace o2v {
 class DoubleActorCritic : public Method {
  public:
   void Collect(VecEnv& env, std::vector<Episode>& episodes) override;
-  void Update(std::vector<double>& stats) override;
+  const std::vector<Ratio>& Update() override;
   void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
                     Mat& P) override;
   LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) override;

@@ -29,7 +29,7 @@ class Iopg final : public Method {
 
   /// Steps the workers until at least one episode ends.
   void Collect(VecEnv& env, std::vector<Episode>& episodes) override;
-  void Update(std::vector<double>& stats) override;
+  const std::vector<Ratio>& Update() override;
   void ChangeTask() override;
   void Visit(StateVisitor& v) override;
   void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
@@ -108,8 +108,7 @@ Iopg::Iopg(const AlgorithmInput& in)
       workers_(std::size_t(in.workers)),
       a_(in.A, in.workers),
       o_one_(1) {
-  Rng init(in.seed, "init");
-  const auto make = [&] { return MakeOptionNets(in, OptionNets::CriticHead::kQ, init); };
+  const auto make = [&] { return MakeOptionNets(in, OptionNets::CriticHead::kQ, init_); };
   nets_ = make();
   // Two time limits: at a change of task the running episode goes on into the new one (spec 4.5).
   const Index room = 2 * Index(in.time_limit);
@@ -198,7 +197,7 @@ void Iopg::Collect(VecEnv& env, std::vector<Episode>& episodes) {
   }
 }
 
-void Iopg::Update(std::vector<double>& stats) {
+const std::vector<Ratio>& Iopg::Update() {
   for (const int i : finished_) {
     Worker& worker = workers_[std::size_t(i)];
     const Index n = worker.length;
@@ -216,7 +215,7 @@ void Iopg::Update(std::vector<double>& stats) {
     for (std::size_t j = 0; j < params_.size(); ++j) worker.params[j]->value = params_[j]->value;
     worker.length = 0;
   }
-  Report(stats);
+  return Report();
 }
 
 // ---- Loss ---------------------------------------------------------------------------------------

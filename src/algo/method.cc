@@ -17,12 +17,10 @@ void OptionUsage::Count(int o, int o_prev, bool init) {
   begun_[std::size_t(o)] += init || o != o_prev;
 }
 
-void OptionUsage::Report(std::vector<double>& stats) const {
+void OptionUsage::Report(std::vector<Ratio>& ratios) const {
   const double steps = std::accumulate(executed_.begin(), executed_.end(), 0.0);
-  for (const double n : executed_) stats.push_back(n / steps);
-  for (std::size_t k = 0; k < executed_.size(); ++k) {
-    stats.push_back(executed_[k] / std::max(1.0, begun_[k]));
-  }
+  for (const double n : executed_) ratios.push_back({n, steps});
+  for (std::size_t k = 0; k < executed_.size(); ++k) ratios.push_back({executed_[k], begun_[k]});
 }
 
 void OptionUsage::Names(std::vector<std::string>& names) const {
@@ -44,14 +42,15 @@ void Method::RecordOptions(Index column, std::span<const int> o, std::span<const
   }
 }
 
-void Method::Report(std::vector<double>& stats) {
-  stats.clear();
+const std::vector<Ratio>& Method::Report() {
+  ratios_.clear();
   for (LossMeans& means : means_) {
-    means.Report(stats);
+    means.Report(ratios_);
     means.Clear();
   }
-  usage_.Report(stats);
+  usage_.Report(ratios_);
   usage_.Clear();
+  return ratios_;
 }
 
 std::vector<std::string> Method::StatNames() const {
@@ -68,8 +67,10 @@ Method::Method(const AlgorithmInput& in, Index K, std::vector<std::string> stage
     : switches_(in.switches),
       K_(K),
       N_(in.workers),
+      init_(in.draw_weights ? Initialiser(init_rng_) : Initialiser()),
       usage_(K),
       seed_(in.seed),
+      init_rng_(in.seed, "init"),
       stages_(std::move(stages)),
       more_(more),
       means_(stages_.size(), LossMeans(more)) {}
@@ -110,9 +111,10 @@ Activation ReadActivation(const Settings& settings) {
   return settings.Int("activation") == 0 ? Activation::kTanh : Activation::kRelu;
 }
 
-OptionNets MakeOptionNets(const AlgorithmInput& in, OptionNets::CriticHead head, Rng& rng) {
+OptionNets MakeOptionNets(const AlgorithmInput& in, OptionNets::CriticHead head,
+                          const Initialiser& init) {
   return OptionNets(in.hyper->Int("options", 1), in.S, in.A, in.hyper->Int("hidden", 1),
-                    ReadActivation(*in.hyper), head, rng);
+                    ReadActivation(*in.hyper), head, init);
 }
 
 // ---- Queries ------------------------------------------------------------------------------------

@@ -32,7 +32,7 @@ class CacheByWidth {
   std::map<Index, std::unique_ptr<Cache>> caches_;
 };
 
-/// How often and how long the options of a rollout were executed.
+/// How often and how long the options were executed since Clear.
 class OptionUsage {
  public:
   explicit OptionUsage(Index K) : executed_(std::size_t(K), 0), begun_(executed_) {}
@@ -40,14 +40,15 @@ class OptionUsage {
   void Clear();
   /// A step with option o, after o_prev or at an episode's start.
   void Count(int o, int o_prev, bool init);
-  /// Appends each option's share of the steps, then the mean length [steps] of its segments; the
-  /// segment that the rollout's start cuts counts where it began.
-  void Report(std::vector<double>& stats) const;
+  /// Appends each option's share of the steps, then the mean length [steps] of its executions: its
+  /// steps by the executions that began. Cut anywhere and added up again they are the same: an
+  /// execution counts once, where it began, and its steps where they are.
+  void Report(std::vector<Ratio>& ratios) const;
   /// The columns of Report.
   void Names(std::vector<std::string>& names) const;
 
  private:
-  std::vector<double> executed_, begun_;  // (K) steps of each option; its segments
+  std::vector<double> executed_, begun_;  // (K) steps of each option; its executions
 };
 
 /// The thin base of the methods: optimiser, random streams, statistics, saved state, and what most
@@ -100,11 +101,12 @@ class Method : public Algorithm {
   void RecordOptions(Index column, std::span<const int> o, std::span<const char> init,
                      Batch& rollout);
   /// The numbers of StatNames() of all steps since the last call.
-  void Report(std::vector<double>& stats);
+  const std::vector<Ratio>& Report();
 
   const Switches switches_;
   const Index K_;
-  const int N_;  // workers
+  const int N_;             // workers
+  const Initialiser init_;  // of the networks; for constructors
   std::vector<Param*> params_;
   std::vector<std::vector<char>> in_graph_;  // of each stage
   std::vector<int> o_prev_;                  // (N), empty where a method keeps them elsewhere
@@ -115,17 +117,20 @@ class Method : public Algorithm {
 
  private:
   const std::uint64_t seed_;
+  Rng init_rng_;  // not part of the state
   const std::vector<std::string> stages_;
   const LossColumns more_;
   std::deque<std::pair<std::string, Rng>> streams_;  // which stay where they are
   std::unique_ptr<Adam> adam_;
   std::vector<LossMeans> means_;  // of each stage
+  std::vector<Ratio> ratios_;     // of the last Report
 };
 
 /// `activation` of a method's numbers, tanh or relu.
 Activation ReadActivation(const Settings& settings);
 
 /// The network of spec 2.3 in the sizes of a method's numbers.
-OptionNets MakeOptionNets(const AlgorithmInput& in, OptionNets::CriticHead head, Rng& rng);
+OptionNets MakeOptionNets(const AlgorithmInput& in, OptionNets::CriticHead head,
+                          const Initialiser& init);
 
 }  // namespace o2v

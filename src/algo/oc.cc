@@ -24,7 +24,7 @@ class OptionCritic final : public Method {
   explicit OptionCritic(const AlgorithmInput& in);
 
   void Collect(VecEnv& env, std::vector<Episode>& episodes) override;
-  void Update(std::vector<double>& stats) override;
+  const std::vector<Ratio>& Update() override;
   void Visit(StateVisitor& v) override;
   void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
                     Mat& P) override;
@@ -74,8 +74,7 @@ OptionCritic::OptionCritic(const AlgorithmInput& in)
       eta_(Real(in.hyper->Real("termination_penalty"))),
       epsilon_(Real(in.hyper->Real("epsilon_greedy"))),
       target_every_(in.hyper->Int("target_every", 1)) {
-  Rng init(in.seed, "init");
-  nets_ = MakeOptionNets(in, OptionNets::CriticHead::kQ, init);
+  nets_ = MakeOptionNets(in, OptionNets::CriticHead::kQ, init_);
   target_ = nets_;
   target_params_ = target_.Params();
   const auto reached = [](const std::string& name) {
@@ -217,9 +216,9 @@ void OptionCritic::TerminationLoss(const Batch& batch, LossTerms& terms, Cache& 
   nets_.BackwardBeta(batch.s, batch.o_prev, betas);
 }
 
-void OptionCritic::Update(std::vector<double>& stats) {
+const std::vector<Ratio>& OptionCritic::Update() {
   Learn(0, rollout_);
-  Report(stats);
+  return Report();
 }
 
 void OptionCritic::OptionPolicy(const Mat& s, const std::vector<int>& o_prev,

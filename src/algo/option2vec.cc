@@ -31,13 +31,15 @@ class Option2Vec final : public Method {
   explicit Option2Vec(const AlgorithmInput& in);
 
   void Collect(VecEnv& env, std::vector<Episode>& episodes) override;
-  void Update(std::vector<double>& stats) override;
+  const std::vector<Ratio>& Update() override;
   void ChangeTask() override { Freeze(); }
   void Visit(StateVisitor& v) override;
   void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
                     Mat& P) override;
   void ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, Mat& sigma) override;
   void OptionValues(const Mat& s, const std::vector<int>& o, Mat& q) override;
+  Param* Embedding() override { return &options_.W_o; }
+  void MeanJacobian(const Mat& s, const std::vector<int>& o, MatD& J) override;
   LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) override;
 
  private:
@@ -102,13 +104,12 @@ Option2Vec::Option2Vec(const AlgorithmInput& in)
       sizes_(ReadSizes(in)),
       scalar_critic_(Paper(switches_.o2v_critic)),
       rollout_(in, /*critics=*/2) {
-  Rng init(in.seed, "init");
   const OptionPolicyNet::Form form{.two_tokens = !Paper(switches_.o2v_query),
                                    .init_relu = !Paper(switches_.o2v_init_relu),
                                    .prev_embed_grad = Paper(switches_.o2v_prev_embed_grad)};
-  options_ = OptionPolicyNet(sizes_, form, init);
-  action_ = ActionPolicyNet(sizes_, init);
-  critic_net_ = OptionValueNet(sizes_, scalar_critic_, init);
+  options_ = OptionPolicyNet(sizes_, form, init_);
+  action_ = ActionPolicyNet(sizes_, init_);
+  critic_net_ = OptionValueNet(sizes_, scalar_critic_, init_);
   // The authors' network allocates one more LayerNorm; it counts, and exists only when every switch
   // of the architecture is `released` (spec 2.7).
   if (!scalar_critic_ && form.two_tokens && form.init_relu) {
@@ -330,12 +331,12 @@ LossTerms Option2Vec::ActionLoss(const Batch& batch, const FixedDraws* fixed) {
 
 // ---- Update -------------------------------------------------------------------------------------
 
-void Option2Vec::Update(std::vector<double>& stats) {
+const std::vector<Ratio>& Option2Vec::Update() {
   const int first = order_rng_.Uniform() < 0.5 ? kHigh : kLow;  // fair coin; spec 4.8 (f)
   for (const int stage : {first, 1 - first}) {
     rollout_.ForEpochs(shuffle_rng_, [&](const Batch& batch) { Learn(stage, batch); });
   }
-  Report(stats);
+  return Report();
 }
 
 // ---- Queries ------------------------------------------------------------------------------------
@@ -361,6 +362,11 @@ void Option2Vec::OptionValues(const Mat& s, const std::vector<int>& o, Mat& q) {
   critic_net_.MakeTable(options_.W_o.value);
   critic_net_.ForwardAll(s, o, options_.W_o.value, c.all);
   q = c.all.q;
+}
+
+void Option2Vec::MeanJacobian(const Mat& s, const std::vector<int>& o, MatD& J) {
+  action_.MakeTable(options_.W_o.value);
+  action_.MeanJacobian(s, o, caches_(s.cols()).action, J);
 }
 
 }  // namespace

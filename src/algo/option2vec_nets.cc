@@ -2,7 +2,6 @@
 
 #include "dist/categorical.h"
 #include "nn/activation.h"
-#include "nn/init.h"
 #include "nn/product.h"
 
 namespace o2v {
@@ -37,27 +36,28 @@ void BackwardNormalized(LayerNorm& norm, Linear& linear, const LayerNorm::Cache&
 
 // ---- Option policy ------------------------------------------------------------------------------
 
-OptionPolicyNet::OptionPolicyNet(const Option2VecSizes& n, const Form& form, Rng& rng)
+OptionPolicyNet::OptionPolicyNet(const Option2VecSizes& n, const Form& form,
+                                 const Initialiser& init)
     : W_o("embed.W_o", n.D, n.K),
       init0("init.0", n.S, n.h_init),
       init1("init.1", n.h_init, n.K),
       form_(form) {
-  Orthogonal(W_o.value, 1, rng);  // rows of E = W_o^T orthonormal for K <= D; spec 2.6 item 1
-  XavierUniform(init0.W.value, rng);
-  XavierUniform(init1.W.value, rng);
+  init.Orthogonal(W_o.value, 1);  // rows of E = W_o^T orthonormal for K <= D; spec 2.6 item 1
+  init.XavierUniform(init0.W.value);
+  init.XavierUniform(init1.W.value);
   if (form.two_tokens) {
     state = Linear("state", n.S, n.D);
-    Orthogonal(state.W.value, 1, rng);
+    init.Orthogonal(state.W.value, 1);
     norm = LayerNorm("state.ln", n.D);
   } else {
     query = EmbeddedLinear("query", n.S, n.D, n.D);
-    Orthogonal(query.W.value, 1, rng);
+    init.Orthogonal(query.W.value, 1);
     norm = LayerNorm("query.ln", n.D);
   }
   block = AttentionBlock("attention", "block", n.D, n.heads, n.F);
-  block.Init(rng);
+  block.Init(init);
   logits = Linear("logits", Tokens() * n.D, n.K);
-  Orthogonal(logits.W.value, 1, rng);
+  init.Orthogonal(logits.W.value, 1);
 }
 
 std::vector<Param*> OptionPolicyNet::Params() {
@@ -167,15 +167,15 @@ void OptionPolicyNet::Backward(const ConstMatRef& s, std::span<const int> o_prev
 
 // ---- Action policy ------------------------------------------------------------------------------
 
-ActionPolicyNet::ActionPolicyNet(const Option2VecSizes& n, Rng& rng)
+ActionPolicyNet::ActionPolicyNet(const Option2VecSizes& n, const Initialiser& init)
     : layer0("action.body.0", n.S, n.D, n.h),
       layer1("action.body.1", n.h, n.h),
       mu("action.mu", n.h, n.A),
       sigma("action.sigma", n.h, n.A) {
-  XavierUniform(layer0.W.value, rng);
-  XavierUniform(layer1.W.value, rng);
-  Orthogonal(mu.W.value, kHeadGain, rng);
-  Orthogonal(sigma.W.value, kHeadGain, rng);
+  init.XavierUniform(layer0.W.value);
+  init.XavierUniform(layer1.W.value);
+  init.Orthogonal(mu.W.value, kHeadGain);
+  init.Orthogonal(sigma.W.value, kHeadGain);
 }
 
 std::vector<Param*> ActionPolicyNet::Params() {
@@ -222,23 +222,39 @@ void ActionPolicyNet::Backward(const ConstMatRef& s, std::span<const int> o, con
   layer0.AddTableGrad(W_o, dtable_, nullptr);  // o_hat is detached
 }
 
+void ActionPolicyNet::MeanJacobian(const ConstMatRef& s, std::span<const int> o, Cache& c,
+                                   MatD& J) const {
+  Forward(s, o, c);
+  const Index h = layer1.W.value.rows(), D = layer0.W.value.cols() - s.rows();
+  const auto on = [](const auto& y) -> Vec { return (y.array() > 0).template cast<Real>(); };
+  MatD sum = MatD::Zero(mu.W.value.rows(), h);  // of what stands before W_e
+  Mat G;
+  for (Index b = 0; b < s.cols(); ++b) {
+    const Vec slope = 1 - c.mu.col(b).array().square();
+    G = slope.asDiagonal() * mu.W.value * on(c.h1.col(b)).asDiagonal();
+    G = G * layer1.W.value * on(c.h0.col(b)).asDiagonal();
+    sum += G.cast<double>();
+  }
+  J = sum * layer0.W.value.rightCols(D).cast<double>() / double(s.cols());
+}
+
 // ---- Option value -------------------------------------------------------------------------------
 
-OptionValueNet::OptionValueNet(const Option2VecSizes& n, bool scalar, Rng& rng)
+OptionValueNet::OptionValueNet(const Option2VecSizes& n, bool scalar, const Initialiser& init)
     : layer1("critic.body.1", n.h, n.h),
       head("critic.q", n.h, scalar ? 1 : n.K),
       scalar_(scalar),
       K_(n.K) {
   if (scalar) {
     layer0 = EmbeddedLinear("critic.body.0", n.S, n.D, n.h);
-    XavierUniform(layer0.W.value, rng);
+    init.XavierUniform(layer0.W.value);
   } else {
     norm = LayerNorm("critic.ln", n.S + n.D);
     layer0_full = Linear("critic.body.0", n.S + n.D, n.h);
-    XavierUniform(layer0_full.W.value, rng);
+    init.XavierUniform(layer0_full.W.value);
   }
-  XavierUniform(layer1.W.value, rng);
-  Orthogonal(head.W.value, 1, rng);
+  init.XavierUniform(layer1.W.value);
+  init.Orthogonal(head.W.value, 1);
 }
 
 std::vector<Param*> OptionValueNet::Params() {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "base/rng.h"
 #include "nn/attention_block.h"
 #include "nn/embedding.h"
+#include "nn/init.h"
 #include "nn/layer_norm.h"
 #include "nn/linear.h"
 
@@ -55,7 +55,7 @@ struct OptionPolicyNet {
   };
 
   OptionPolicyNet() = default;
-  OptionPolicyNet(const Option2VecSizes& sizes, const Form& form, Rng& rng);
+  OptionPolicyNet(const Option2VecSizes& sizes, const Form& form, const Initialiser& init);
 
   /// Makes what follows from the weights alone; needed before Forward whenever they have changed.
   void MakeTables();
@@ -90,7 +90,7 @@ struct ActionPolicyNet {
   };
 
   ActionPolicyNet() = default;
-  ActionPolicyNet(const Option2VecSizes& sizes, Rng& rng);
+  ActionPolicyNet(const Option2VecSizes& sizes, const Initialiser& init);
 
   /// W_o (D, K). Needed before Forward whenever the weights have changed.
   void MakeTable(const Mat& W_o) { layer0.MakeTable(W_o, table_); }
@@ -98,6 +98,10 @@ struct ActionPolicyNet {
   void Forward(const ConstMatRef& s, std::span<const int> o, Cache& c) const;
   /// From c.dmu, c.dsigma. Adds to the gradients.
   void Backward(const ConstMatRef& s, std::span<const int> o, const Mat& W_o, Cache& c);
+  /// s (S, B), o (B) -> J (A, D), mean over the samples of
+  ///   d mu / d o_hat = diag(1 - mu^2) W_mu diag(h1 > 0) W_1 diag(h0 > 0) W_e,
+  /// W_e the part of W_0 that multiplies o_hat; 0 is the derivative at a ReLU's kink. Runs Forward.
+  void MeanJacobian(const ConstMatRef& s, std::span<const int> o, Cache& c, MatD& J) const;
 
   std::vector<Param*> Params();
 
@@ -128,7 +132,7 @@ struct OptionValueNet {
   };
 
   OptionValueNet() = default;
-  OptionValueNet(const Option2VecSizes& sizes, bool scalar, Rng& rng);
+  OptionValueNet(const Option2VecSizes& sizes, bool scalar, const Initialiser& init);
 
   void MakeTable(const Mat& W_o) {
     if (scalar_) layer0.MakeTable(W_o, table_);

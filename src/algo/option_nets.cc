@@ -5,7 +5,6 @@
 #include "dist/categorical.h"
 #include "nn/activation.h"
 #include "nn/embedding.h"
-#include "nn/init.h"
 
 namespace o2v {
 namespace {
@@ -36,10 +35,10 @@ void SortByOption(std::span<const int> o, Index K, std::vector<int>& sample,
 // ---- Bank ---------------------------------------------------------------------------------------
 
 OptionBank::OptionBank(const std::string& name, Index K, Index S, Index h, Index n_out,
-                       Activation activation, Rng& rng) {
+                       Activation activation, const Initialiser& init) {
   for (Index k = 0; k < K; ++k) {
     nets_.emplace_back(OptionName(k, name + ".body"), OptionName(k, name + ".head"), S, h, n_out,
-                       activation, rng);
+                       activation, init);
   }
 }
 
@@ -103,8 +102,9 @@ void OptionBank::Backward(const ConstMatRef& s, Cache& c) {
 
 // ---- Intra-option policies ----------------------------------------------------------------------
 
-OptionPolicies::OptionPolicies(Index K, Index S, Index A, Index h, Activation activation, Rng& rng)
-    : mu_("mu", K, S, h, A, activation, rng), sigma_(A, K), dsigma_(A, K) {
+OptionPolicies::OptionPolicies(Index K, Index S, Index A, Index h, Activation activation,
+                               const Initialiser& init)
+    : mu_("mu", K, S, h, A, activation, init), sigma_(A, K), dsigma_(A, K) {
   for (Index k = 0; k < K; ++k) rho_.emplace_back(OptionName(k, "rho"), A, 1);
 }
 
@@ -153,14 +153,14 @@ std::vector<Param*> OptionPolicies::Params(Index k) {
 // ---- Option network -----------------------------------------------------------------------------
 
 OptionNets::OptionNets(Index K, Index S, Index A, Index h, Activation activation, CriticHead head,
-                       Rng& rng)
-    : master("master.body", "master.head", S, h, K, activation, rng) {
+                       const Initialiser& init)
+    : master("master.body", "master.head", S, h, K, activation, init) {
   const bool q = head == CriticHead::kQ;
-  critic = Net("critic.body", q ? "critic.q" : "critic.u", S, h, q ? K : K + 1, activation, rng);
+  critic = Net("critic.body", q ? "critic.q" : "critic.u", S, h, q ? K : K + 1, activation, init);
   idle_head = Linear(q ? "critic.u" : "critic.q", h, q ? K + 1 : K);
-  Orthogonal(idle_head.W.value, kHeadGain, rng);
-  policy = OptionPolicies(K, S, A, h, activation, rng);
-  beta = OptionBank("beta", K, S, h, 1, activation, rng);
+  init.Orthogonal(idle_head.W.value, kHeadGain);
+  policy = OptionPolicies(K, S, A, h, activation, init);
+  beta = OptionBank("beta", K, S, h, 1, activation, init);
 }
 
 void OptionNets::Beta(const ConstMatRef& s, std::span<const int> o, bool all, BetaCache& c) const {

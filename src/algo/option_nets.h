@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "algo/switches.h"
-#include "base/rng.h"
 #include "nn/mlp.h"
 
 namespace o2v {
@@ -29,7 +28,7 @@ class OptionBank {
   OptionBank() = default;
   /// Networks named option<k>.`name`.body and option<k>.`name`.head.
   OptionBank(const std::string& name, Index K, Index S, Index h, Index n_out, Activation activation,
-             Rng& rng);
+             const Initialiser& init);
 
   /// s (S, B), o (B) -> cache.out (n_out, B).
   void ForwardOne(const ConstMatRef& s, std::span<const int> o, Cache& cache) const;
@@ -57,7 +56,8 @@ class OptionPolicies {
   };
 
   OptionPolicies() = default;
-  OptionPolicies(Index K, Index S, Index A, Index h, Activation activation, Rng& rng);
+  OptionPolicies(Index K, Index S, Index A, Index h, Activation activation,
+                 const Initialiser& init);
 
   /// sigma_k of all options; needed before the forward passes whenever rho has changed.
   void MakeSigma();
@@ -91,7 +91,8 @@ struct OptionNets {
   OptionBank beta;  // logits b_k of the terminations
 
   OptionNets() = default;
-  OptionNets(Index K, Index S, Index A, Index h, Activation activation, CriticHead head, Rng& rng);
+  OptionNets(Index K, Index S, Index A, Index h, Activation activation, CriticHead head,
+             const Initialiser& init);
 
   /// Terminations, beta_k = sigmoid(b_k).
   struct BetaCache {

@@ -17,7 +17,7 @@ class Ppo final : public Method {
   explicit Ppo(const AlgorithmInput& in);
 
   void Collect(VecEnv& env, std::vector<Episode>& episodes) override;
-  void Update(std::vector<double>& stats) override;
+  const std::vector<Ratio>& Update() override;
   void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
                     Mat& P) override;
   void ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, Mat& sigma) override;
@@ -51,11 +51,10 @@ Ppo::Ppo(const AlgorithmInput& in)
       entropy_weight_(in.hyper->Real("entropy_weight")),
       rho_("actor.rho", in.A, 1),
       rollout_(in, /*critics=*/1) {
-  Rng init(in.seed, "init");
   const Index h = in.hyper->Int("hidden", 1);
   const Activation g = ReadActivation(*in.hyper);
-  actor_ = Net("actor.body", "actor.head", in.S, h, in.A, g, init);
-  critic_net_ = Net("critic.body", "critic.v", in.S, h, 1, g, init);
+  actor_ = Net("actor.body", "actor.head", in.S, h, in.A, g, init_);
+  critic_net_ = Net("critic.body", "critic.v", in.S, h, 1, g, init_);
   std::vector<Param*> params = actor_.Params();
   params.push_back(&rho_);
   Append(params, critic_net_.Params());
@@ -122,9 +121,9 @@ LossTerms Ppo::Loss(int, const Batch& batch, const FixedDraws*) {
   return terms;
 }
 
-void Ppo::Update(std::vector<double>& stats) {
+const std::vector<Ratio>& Ppo::Update() {
   rollout_.ForEpochs(shuffle_rng_, [&](const Batch& batch) { Learn(0, batch); });
-  Report(stats);
+  return Report();
 }
 
 void Ppo::OptionPolicy(const Mat& s, const std::vector<int>&, const std::vector<char>&, Mat& P) {

@@ -25,7 +25,7 @@ class Ppoc final : public Method {
   explicit Ppoc(const AlgorithmInput& in);
 
   void Collect(VecEnv& env, std::vector<Episode>& episodes) override;
-  void Update(std::vector<double>& stats) override;
+  const std::vector<Ratio>& Update() override;
   void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
                     Mat& P) override;
   LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) override;
@@ -64,8 +64,7 @@ Ppoc::Ppoc(const AlgorithmInput& in)
       w_(Real(in.hyper->Real("entropy_weight"))),
       eta_(Real(in.hyper->Real("termination_penalty"))),
       rollout_(in, /*critics=*/1) {
-  Rng init(in.seed, "init");
-  nets_ = MakeOptionNets(in, OptionNets::CriticHead::kQ, init);
+  nets_ = MakeOptionNets(in, OptionNets::CriticHead::kQ, init_);
   const auto reached = [](const std::string& name) { return !name.starts_with("critic.u."); };
   Assemble(in, nets_.Params(), {reached}, &nets_.policy, &nets_.critic);
   o_prev_.assign(std::size_t(N_), 0);
@@ -176,9 +175,9 @@ void Ppoc::MasterWeight(const Batch& batch, Cache& c) const {
   }
 }
 
-void Ppoc::Update(std::vector<double>& stats) {
+const std::vector<Ratio>& Ppoc::Update() {
   rollout_.ForEpochs(shuffle_rng_, [&](const Batch& batch) { Learn(0, batch); });
-  Report(stats);
+  return Report();
 }
 
 void Ppoc::OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,

@@ -115,9 +115,9 @@ void LossMeans::Add(const LossTerms& terms, double grad_norm) {
   ++n_;
 }
 
-void LossMeans::Report(std::vector<double>& stats) const {
-  for (const double sum : sums_) stats.push_back(sum / n_);
-  stats.push_back(grad_norm_ / n_);
+void LossMeans::Report(std::vector<Ratio>& ratios) const {
+  for (const double sum : sums_) ratios.push_back({sum, double(n_)});
+  ratios.push_back({grad_norm_, double(n_)});
 }
 
 void LossMeans::Names(const std::string& stage, std::vector<std::string>& names,

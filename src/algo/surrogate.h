@@ -71,7 +71,7 @@ class LossMeans {
   void Add(const LossTerms& terms, double grad_norm);
   /// Appends total, surrogate, value, entropy, kl, clip_fraction, the other columns and grad_norm,
   /// in the order of Names.
-  void Report(std::vector<double>& stats) const;
+  void Report(std::vector<Ratio>& ratios) const;
   /// The columns of `stage`.
   static void Names(const std::string& stage, std::vector<std::string>& names,
                     const LossColumns& more = {});

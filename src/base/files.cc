@@ -34,6 +34,10 @@ class Descriptor {
   int fd_;
 };
 
+void Sync(const Descriptor& file) {
+  if (::fsync(file.fd()) != 0) file.Fail("cannot write to the disk");
+}
+
 }  // namespace
 
 std::string ReadFile(const std::filesystem::path& path) {
@@ -59,7 +63,7 @@ void WriteFileAtomically(const std::filesystem::path& path, std::string_view tex
       if (n < 0) file.Fail("cannot write");
       text.remove_prefix(static_cast<std::size_t>(n));
     }
-    if (::fsync(file.fd()) != 0) file.Fail("cannot write to the disk");
+    Sync(file);
   }
   if (before_rename) before_rename();
   if (std::rename(temporary.c_str(), path.c_str()) != 0) {
@@ -67,5 +71,7 @@ void WriteFileAtomically(const std::filesystem::path& path, std::string_view tex
         Concat(path.string(), ": cannot replace: ", std::generic_category().message(errno)));
   }
 }
+
+void SyncFile(const std::filesystem::path& path) { Sync(Descriptor(path, O_WRONLY)); }
 
 }  // namespace o2v

@@ -17,4 +17,8 @@ std::string ReadFile(const std::filesystem::path& path);
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view text,
                          const std::function<void()>& before_rename = {});
 
+/// Brings a file that others have written to the disk. Throws Error naming the file and the
+/// system's reason.
+void SyncFile(const std::filesystem::path& path);
+
 }  // namespace o2v

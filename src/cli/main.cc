@@ -19,6 +19,7 @@
 #include "harness/checkpoint.h"
 #include "harness/config.h"
 #include "harness/evaluate.h"
+#include "harness/interpret.h"
 #include "harness/jobs.h"
 #include "harness/param_table.h"
 #include "harness/record.h"
@@ -31,7 +32,7 @@ namespace {
 // Set by SIGINT and SIGTERM: a handler can reach nothing else.
 volatile std::sig_atomic_t stop_signal = 0;
 
-/// Options that name a task and a method, of `train`, `eval` and `forward`.
+/// Options that name a task and a method, of `train`, `eval`, `forward` and `interpret`.
 struct RunOptions {
   RunRequest request;
   std::string config;
@@ -124,10 +125,11 @@ void AddTrain(CLI::App& app) {
   });
 }
 
-// ---- eval, forward
+// ---- eval, forward, interpret
 
 /// A checkpoint's policy on its task.
 struct Policy {
+  RunConfig config;
   std::unique_ptr<Env> env;
   std::unique_ptr<Algorithm> algorithm;
   Normalizer normalizer;
@@ -153,7 +155,7 @@ Policy LoadPolicyFile(const std::string& checkpoint, RunRequest request) {
   const EnvOptions options{.contact_forces = config.switches.contact_forces};
   std::unique_ptr<Env> env = MakeEnv(SplitTasks(task.value_or(config.task)).back(), options);
   const EnvSpec spec = env->Spec();
-  Policy policy{std::move(env), MakeRunAlgorithm(config, spec), Normalizer(spec.S)};
+  Policy policy{config, std::move(env), MakeRunAlgorithm(config, spec), Normalizer(spec.S)};
   LoadPolicy(checkpoint, *policy.algorithm, policy.normalizer);
   return policy;
 }
@@ -218,6 +220,57 @@ void AddForward(CLI::App& app) {
   forward->callback([opt] {
     Policy policy = LoadPolicyFile(opt->checkpoint, opt->request);
     Forward(*policy.algorithm, policy.env->Spec(), opt->input, opt->output);
+  });
+}
+
+void AddInterpret(CLI::App& app) {
+  struct Options : RunOptions {
+    std::filesystem::path run, out;
+    int episodes = 10;
+    double delta = kDelta;
+    std::uint64_t seed = 0;
+  };
+  auto opt = std::make_shared<Options>();
+  CLI::App* interpret =
+      app.add_subcommand("interpret", "what the dimensions of Option2Vec's embedding do");
+  interpret->add_option("run", opt->run, "folder of a run, or a checkpoint file")->required();
+  opt->Add(*interpret);
+  interpret->add_option("--episodes", opt->episodes, "whole episodes")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  interpret->add_option("--delta", opt->delta, "by which a dimension is perturbed")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  interpret->add_option("--seed", opt->seed, "of the episodes")->capture_default_str();
+  interpret->add_option("--out", opt->out,
+                        "CSV (default results/interpret/<fidelity>/<task>/option2vec/seed-NNN.csv "
+                        "of the run's own)");
+  interpret->footer(
+      "A row a dimension d: W_o(d, k); the mean over the visited states of d mu_a / d o_hat_d, "
+      "o_hat the\nembedding of the option executed there; the mean change of mu_a by "
+      "o_hat_d + delta.\n"
+      "The networks of a run over two tasks are those that the last one left, so the default is "
+      "to act\non it; --task chooses the other.\n"
+      "Example:\n  option2vec interpret runs/a --episodes 20 --out a.csv");
+  interpret->callback([opt] {
+    const std::filesystem::path file = FindCheckpoint(opt->run);
+    Policy policy = LoadPolicyFile(file.string(), opt->request);
+    if (!policy.algorithm->Embedding()) {
+      throw ConfigError(Concat(file.string(), ": made by ", policy.config.algorithm,
+                               ", whose options have no embedding"));
+    }
+    if (opt->out.empty() && !ReadMetadata(file).contains("config")) {
+      throw ConfigError(file.string() + ": does not say of which run it is; --out is needed");
+    }
+    const std::string& task = policy.env->Spec().id;
+    const std::filesystem::path out =
+        opt->out.empty() ? InterpretationPath(policy.config, task) : opt->out;
+    if (out.has_parent_path()) std::filesystem::create_directories(out.parent_path());
+    const Interpretation found = Interpret(*policy.algorithm, policy.normalizer, *policy.env,
+                                           opt->episodes, opt->delta, opt->seed);
+    WriteFileAtomically(out, InterpretationCsv(found));
+    std::cout << out.string() << ": " << found.W_o.rows() << " dimensions, " << found.states
+              << " states of " << opt->episodes << " episodes on " << task << "\n";
   });
 }
 
@@ -290,37 +343,63 @@ void AddRecord(CLI::App& app) {
   });
 }
 
+/// Options that name a grid of runs, of `jobs` and `progress`.
+struct GridOptions {
+  JobQuery query;
+  std::string seeds;
+
+  void Add(CLI::App& app) {
+    app.add_option("experiments", query.configs, "a .toml file, or quick, single_task, ...")
+        ->required();
+    app.add_option("--tasks", query.tasks,
+                   "instead of the experiment's, A,B; of several experiments, those to take")
+        ->delimiter(',');
+    app.add_option("--algos", query.algorithms, "instead of the experiment's")->delimiter(',');
+    app.add_option("--fidelity", query.fidelities, "likewise")->delimiter(',');
+    app.add_option("--seeds", seeds, "likewise, such as 0-4,7");
+    app.add_option("--results", query.results, "folder of all results")->capture_default_str();
+  }
+  std::vector<Job> List() {
+    if (!seeds.empty()) query.seeds = ParseSeeds(seeds);
+    return ListJobs(query);
+  }
+};
+
 void AddJobs(CLI::App& app, const std::string& program) {
-  struct Options {
-    JobQuery query;
-    std::string seeds;
-  };
-  auto opt = std::make_shared<Options>();
+  auto opt = std::make_shared<GridOptions>();
   opt->query.program = program;
-  CLI::App* jobs = app.add_subcommand("jobs", "the runs of an experiment, one command a line");
-  jobs->add_option("experiments", opt->query.configs, "a .toml file, or quick, single_task, ...")
-      ->required();
-  jobs->add_option("--tasks", opt->query.tasks, "instead of the experiment's, A,B")->delimiter(',');
-  jobs->add_option("--algos", opt->query.algorithms, "likewise")->delimiter(',');
-  jobs->add_option("--fidelity", opt->query.fidelities, "likewise")->delimiter(',');
-  jobs->add_option("--seeds", opt->seeds, "likewise, such as 0-4,7");
-  jobs->add_option("--results", opt->query.results, "folder of all results")->capture_default_str();
+  CLI::App* jobs = app.add_subcommand("jobs", "the runs of experiments, one command a line");
+  opt->Add(*jobs);
   jobs->footer(
-      "Commands start a run or go on with it; finished and diverged runs are left out and named "
-      "on\n"
-      "standard error.\n"
+      "Commands start a run or go on with it; finished and diverged runs are left out, and those "
+      "that an\nolder revision of a method's code made are named on standard error.\n"
       "Example:\n  option2vec jobs quick --seeds 0-4 | xargs -P 2 -d '\\n' -n 1 sh -c");
   jobs->callback([opt] {
-    if (!opt->seeds.empty()) opt->query.seeds = ParseSeeds(opt->seeds);
-    for (const Job& job : ListJobs(opt->query)) {
-      if (job.finished) {
-        std::cerr << job.dir.string() << ": " << ToString(*job.finished)
-                  << (job.old ? ", by an older revision of the method" : "") << "\n";
-      } else {
+    for (const Job& job : opt->List()) {
+      if (!job.finished) {
         std::cout << job.command << "\n";
+      } else if (job.old) {
+        std::cerr << job.dir.string() << ": by an older revision of the method\n";
       }
     }
   });
+}
+
+void AddProgress(CLI::App& app) {
+  struct Options : GridOptions {
+    int at_once = 1;
+  };
+  auto opt = std::make_shared<Options>();
+  CLI::App* progress = app.add_subcommand("progress", "how far the runs of experiments have come");
+  opt->Add(*progress);
+  progress->add_option("--at-once", opt->at_once, "runs at a time")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  progress->footer(
+      "The time left is what finished runs of the same kind took.\n"
+      "Example:\n  option2vec progress single_task transfer --fidelity paper --at-once 2");
+  progress->callback(
+      [opt] { std::cout << ToString(MeasureProgress(opt->List()), opt->at_once) << "\n"; });
 }
 
 void AddSummary(CLI::App& app) {
@@ -349,10 +428,12 @@ int Main(int argc, char** argv) {
   AddTrain(app);
   AddEval(app);
   AddForward(app);
+  AddInterpret(app);
   AddParams(app);
   AddReplay(app, exit_code);
   AddRecord(app);
   AddJobs(app, argv[0]);
+  AddProgress(app);
   AddSummary(app);
   auto fail = [](const std::exception& e, int code) {
     std::cerr << "option2vec: " << e.what() << "\n";

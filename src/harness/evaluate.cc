@@ -33,7 +33,8 @@ int ReadIndex(const CsvTable& table, std::size_t row, std::size_t column, int n)
 }  // namespace
 
 std::vector<EvalEpisode> Evaluate(Algorithm& algorithm, const Normalizer& normalizer, Env& env,
-                                  int episodes, bool sample_action, std::uint64_t seed) {
+                                  int episodes, bool sample_action, std::uint64_t seed,
+                                  const VisitHook& visit) {
   const EnvSpec& spec = env.Spec();
   Rng resets(seed, "eval.reset"), options(seed, "eval.option"), actions(seed, "eval.action");
   VecD raw(spec.S);
@@ -54,6 +55,7 @@ std::vector<EvalEpisode> Evaluate(Algorithm& algorithm, const Normalizer& normal
       s = state;
       algorithm.OptionPolicy(s, o_prev, init, P);
       SampleCategorical(P, options, o);
+      if (visit) visit(s, o[0]);
       algorithm.ActionPolicy(s, o, mu, sigma);
       for (std::size_t j = 0; j < a.size(); ++j) {
         const Index row = static_cast<Index>(j);

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <vector>
 
 #include "algo/algorithm.h"
@@ -17,11 +18,15 @@ struct EvalEpisode {
   int length;  // [environment steps]
 };
 
+/// Called in a visited state s (S, 1), normalised, with the option o executed there.
+using VisitHook = std::function<void(const Mat& s, int o)>;
+
 /// Runs whole episodes with frozen networks and statistics. Options are drawn from the option
 /// policy; actions from the Gaussian, or its mean when `sample_action` is false. The same seed
 /// gives the same episodes: all randomness comes from streams "eval.*" of `seed`.
 std::vector<EvalEpisode> Evaluate(Algorithm& algorithm, const Normalizer& normalizer, Env& env,
-                                  int episodes, bool sample_action, std::uint64_t seed);
+                                  int episodes, bool sample_action, std::uint64_t seed,
+                                  const VisitHook& visit = {});
 
 /// Network outputs for given inputs, dropout off. Reads a CSV with the columns s0.. (S, normalised
 /// state), o_prev, init, o (0-based; the option fed to action net and critic), in any order, and

@@ -1,7 +1,11 @@
 #include "harness/jobs.h"
 
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <cstdio>
+#include <map>
+#include <set>
 #include <string_view>
 
 #include "base/check.h"
@@ -39,6 +43,7 @@ void MarkFinished(Job& job) {
                              "configuration; move it away to run it again"));
   }
   job.finished = run.status;
+  job.cpu_seconds = run.cpu_seconds;
   job.old = run.revision < FindAlgorithm(job.config.algorithm).revision;
 }
 
@@ -48,20 +53,38 @@ std::vector<Job> ListJobs(const JobQuery& query) {
   std::vector<ConfigText> files;
   std::vector<Experiment> experiments;
   std::size_t most_seeds = 0;
+  std::set<std::string> taken;
   for (const std::string& config : query.configs) {
     files.push_back(OpenConfig(config));
     Experiment experiment = ReadExperiment(files.back());
-    if (!query.tasks.empty()) experiment.tasks = query.tasks;
+    if (!query.tasks.empty()) {
+      std::vector<std::string> tasks;
+      for (const std::string& task : query.tasks) {
+        const auto& own = experiment.tasks;
+        if (query.configs.size() > 1 && std::find(own.begin(), own.end(), task) == own.end()) {
+          continue;
+        }
+        tasks.push_back(task);
+        taken.insert(task);
+      }
+      experiment.tasks = tasks;
+    }
     if (!query.algorithms.empty()) experiment.algorithms = query.algorithms;
     if (!query.fidelities.empty()) experiment.fidelities = query.fidelities;
     if (!query.seeds.empty()) experiment.seeds = query.seeds;
     most_seeds = std::max(most_seeds, experiment.seeds.size());
     experiments.push_back(std::move(experiment));
   }
+  for (const std::string& task : query.tasks) {
+    if (!taken.contains(task)) {
+      throw ConfigError(Concat("task '", task, "' is in none of the experiments"));
+    }
+  }
 
   std::vector<Job> jobs;
-  auto add = [&](std::size_t e, const std::string& fidelity, const std::string& task,
-                 const std::string& algorithm, std::uint64_t seed) {
+  // `flip`: a switch to turn, or null.
+  auto add = [&](std::size_t e, const std::string& fidelity, const SwitchInfo* flip,
+                 const std::string& task, const std::string& algorithm, std::uint64_t seed) {
     RunRequest request;
     request.config = files[e];
     request.fidelity = fidelity;
@@ -70,11 +93,23 @@ std::vector<Job> ListJobs(const JobQuery& query) {
     request.seed = static_cast<std::int64_t>(seed);
     Job job;
     job.config = ResolveRun(request);
-    job.dir = query.results / experiments[e].name / fidelity / task / algorithm / SeedFolder(seed);
+    std::string variant = fidelity, set;
+    if (flip) {
+      if (!Concerns(*flip, job.config)) return;
+      const Fidelity other =
+          job.config.fidelity == Fidelity::kPaper ? Fidelity::kReleased : Fidelity::kPaper;
+      const std::string setting = Concat(flip->name, "=", SwitchValue(SwitchesFor(other), *flip));
+      request.set = {setting};
+      job.config = ResolveRun(request);
+      variant += "-" + setting;
+      set = " --set " + Quoted(setting);
+    }
+    job.dir = query.results / experiments[e].name / variant / task / algorithm / SeedFolder(seed);
+    job.kind = Concat(task, " ", algorithm, " ", fidelity);
     job.command =
         Concat(Quoted(query.program), " train --config ", Quoted(query.configs[e]), " --task ",
-               task, " --algo ", algorithm, " --fidelity ", fidelity, " --seed ", seed, " --steps ",
-               job.config.steps, " --out ", Quoted(job.dir.string()), " --resume");
+               task, " --algo ", algorithm, " --fidelity ", fidelity, set, " --seed ", seed,
+               " --steps ", job.config.steps, " --out ", Quoted(job.dir.string()), " --resume");
     MarkFinished(job);
     jobs.push_back(std::move(job));
   };
@@ -82,16 +117,87 @@ std::vector<Job> ListJobs(const JobQuery& query) {
     for (std::size_t e = 0; e < experiments.size(); ++e) {
       const Experiment& x = experiments[e];
       if (i >= x.seeds.size()) continue;
+      std::vector<const SwitchInfo*> flips;
+      for (const SwitchInfo& info : SwitchRegistry()) {
+        if (std::find(x.flips.begin(), x.flips.end(), info.name) != x.flips.end()) {
+          flips.push_back(&info);
+        }
+      }
+      if (x.flips.empty()) flips.push_back(nullptr);
       for (const std::string& fidelity : x.fidelities) {
-        for (const std::string& task : x.tasks) {
-          for (const std::string& algorithm : x.algorithms) {
-            add(e, fidelity, task, algorithm, x.seeds[i]);
+        for (const SwitchInfo* flip : flips) {
+          for (const std::string& task : x.tasks) {
+            for (const std::string& algorithm : x.algorithms) {
+              add(e, fidelity, flip, task, algorithm, x.seeds[i]);
+            }
           }
         }
       }
     }
   }
   return jobs;
+}
+
+Progress MeasureProgress(const std::vector<Job>& jobs) {
+  struct Cost {
+    double seconds = 0, steps = 0;
+    void Add(const Job& job) {
+      seconds += job.cpu_seconds;
+      steps += double(job.config.steps);
+    }
+  };
+  Progress progress;
+  std::map<std::string, Cost> of_kind, of_task;
+  Cost of_all;
+  std::set<std::string> kinds;
+  for (const Job& job : jobs) {
+    kinds.insert(job.kind);
+    ++progress.runs;
+    if (!job.finished) continue;
+    ++progress.finished;
+    if (*job.finished == RunStatus::kDiverged) {  // broke off: its cost says nothing
+      ++progress.diverged;
+      continue;
+    }
+    of_kind[job.kind].Add(job);
+    of_task[job.config.task].Add(job);
+    of_all.Add(job);
+  }
+  progress.kinds = static_cast<int>(kinds.size());
+  progress.timed = static_cast<int>(of_kind.size());
+  if (of_all.steps == 0) return progress;
+  double left = 0;
+  for (const Job& job : jobs) {
+    if (job.finished) continue;
+    const auto kind = of_kind.find(job.kind);
+    const auto task = of_task.find(job.config.task);
+    const Cost& cost = kind != of_kind.end()   ? kind->second
+                       : task != of_task.end() ? task->second
+                                               : of_all;
+    left += cost.seconds / cost.steps * double(job.config.steps);
+  }
+  progress.cpu_seconds_left = left;
+  return progress;
+}
+
+std::string ToString(const Progress& progress, int at_once) {
+  std::string text = Concat(progress.runs, " runs: ", progress.finished, " done");
+  if (progress.diverged > 0) text += Concat(" (", progress.diverged, " diverged)");
+  const int left = progress.runs - progress.finished;
+  text += Concat(", ", left, " left");
+  if (left == 0) return text;
+  if (!progress.cpu_seconds_left) return text + ", time left known after the first";
+  constexpr double kHour = 3600;
+  const double hours = *progress.cpu_seconds_left / kHour;
+  std::array<char, 160> line{};
+  std::snprintf(line.data(), line.size(), ", about %.1f CPU hours, %.1f h with %d at a time", hours,
+                hours / at_once, at_once);
+  text += line.data();
+  if (progress.timed < progress.kinds) {
+    text += Concat(" (", progress.timed, " of ", progress.kinds,
+                   " kinds of runs timed, the rest guessed from these)");
+  }
+  return text;
 }
 
 std::vector<std::uint64_t> ParseSeeds(const std::string& text) {

@@ -64,6 +64,7 @@ void CsvLog::Row(const std::vector<std::string>& cells) {
 void CsvLog::Flush() {
   out_.flush();
   Check(out_.good(), path_.string(), ": cannot write");
+  SyncFile(path_);
 }
 
 void CsvLog::Visit(StateVisitor& v, const std::string& prefix) {
@@ -74,7 +75,9 @@ void CsvLog::Visit(StateVisitor& v, const std::string& prefix) {
 RunLogs::RunLogs(const std::filesystem::path& dir, const std::vector<std::string>& stat_names,
                  bool evals)
     : episodes_(dir / "episodes.csv", kEpisodesHeader),
-      updates_(dir / "updates.csv", UpdatesHeader(stat_names)) {
+      updates_(dir / "updates.csv", UpdatesHeader(stat_names)),
+      sums_(VecD::Zero(Index(stat_names.size()))),
+      ns_(sums_) {
   if (evals) evals_.emplace_back(dir / "evals.csv", "step,episode,return");
 }
 
@@ -95,10 +98,27 @@ void RunLogs::AddEpisode(const Episode& e) {
                  Decimal(e.terminated), Decimal(e.truncated)});
 }
 
-void RunLogs::AddUpdate(std::int64_t step, std::span<const double> stats) {
-  std::vector<std::string> cells = {Decimal(step)};
-  for (const double x : stats) cells.push_back(Decimal(x));
+void RunLogs::AddUpdate(std::int64_t step, std::span<const Ratio> ratios) {
+  Check(Index(ratios.size()) == sums_.size(), "updates.csv: got ", ratios.size(), " numbers for ",
+        sums_.size(), " columns");
+  for (std::size_t i = 0; i < ratios.size(); ++i) {
+    sums_(Index(i)) += ratios[i].sum;
+    ns_(Index(i)) += ratios[i].n;
+  }
+  step_ = step;
+  if (step_ - row_step_ >= kRowSteps) EndUpdates();
+}
+
+void RunLogs::EndUpdates() {
+  if (step_ == row_step_) return;
+  std::vector<std::string> cells = {Decimal(step_)};
+  for (Index i = 0; i < sums_.size(); ++i) {
+    cells.push_back(Decimal(Ratio{sums_(i), ns_(i)}.Value()));
+  }
   updates_.Row(cells);
+  row_step_ = step_;
+  sums_.setZero();
+  ns_.setZero();
 }
 
 void RunLogs::AddEval(std::int64_t step, int episode, double ret) {
@@ -114,6 +134,10 @@ void RunLogs::Flush() {
 void RunLogs::Visit(StateVisitor& v) {
   episodes_.Visit(v, "episodes");
   updates_.Visit(v, "updates");
+  v.Int("updates.row_step", row_step_);
+  v.Int("updates.step", step_);
+  v.Doubles("updates.sums", sums_);
+  v.Doubles("updates.ns", ns_);
   for (CsvLog& log : evals_) log.Visit(v, "evals");
 }
 

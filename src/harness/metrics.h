@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "algo/algorithm.h"
 #include "base/csv.h"
 #include "base/state.h"
 #include "rollout/vec_env.h"
@@ -27,7 +28,7 @@ class CsvLog {
   void Resume();
   /// Appends a row of ready cells.
   void Row(const std::vector<std::string>& cells);
-  /// Hands all rows to the system. Throws Error when a write failed.
+  /// Brings all rows to the disk. Throws Error when a write failed.
   void Flush();
 
   /// `<prefix>.bytes`, `<prefix>.hash`.
@@ -46,20 +47,31 @@ class CsvLog {
 /// episodes.csv, updates.csv and, where wanted, evals.csv.
 class RunLogs {
  public:
+  /// Of updates.csv: an update of as many environment steps has a row of its own; smaller ones are
+  /// put together. Ours: PPO's rollout.
+  static constexpr std::int64_t kRowSteps = 2048;
+
   /// updates.csv has the column `step` and `stat_names`.
   RunLogs(const std::filesystem::path& dir, const std::vector<std::string>& stat_names, bool evals);
 
   void Create();
   void Resume();
   void AddEpisode(const Episode& episode);
-  void AddUpdate(std::int64_t step, std::span<const double> stats);
+  /// The statistics of the update at `step`. A row is written, with the values of the sums of the
+  /// updates since the last row, once kRowSteps have passed since that.
+  void AddUpdate(std::int64_t step, std::span<const Ratio> ratios);
+  /// No update follows: writes a row of those since the last one.
+  void EndUpdates();
   void AddEval(std::int64_t step, int episode, double ret);
+  /// Before a checkpoint, which holds the lengths of the files: none may be shorter than it says.
   void Flush();
   void Visit(StateVisitor& v);
 
  private:
   CsvLog episodes_, updates_;
-  std::vector<CsvLog> evals_;  // one or none
+  std::int64_t row_step_ = 0, step_ = 0;  // of the last row, of the last update
+  VecD sums_, ns_;                        // of the updates after row_step_
+  std::vector<CsvLog> evals_;             // one or none
 };
 
 /// A point of a learning curve: step [environment steps], return.

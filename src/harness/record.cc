@@ -80,7 +80,8 @@ Record ReadRecord(const std::filesystem::path& path) {
   try {
     const ordered_json in = ordered_json::parse(ReadFile(path));
     return {ParseStatus(in.at("status").get<std::string>()), in.at("steps").get<std::int64_t>(),
-            in.value("revision", 1), in.at("config").get<std::string>()};
+            in.value("revision", 1), in.at("cpu_seconds").get<double>(),
+            in.at("config").get<std::string>()};
   } catch (const std::exception& e) {
     throw Error(Concat(path.string(), ": cannot be read: ", e.what()));
   }

@@ -40,6 +40,7 @@ struct Record {
   RunStatus status;
   std::int64_t steps;  // environment steps of all workers
   int revision;        // of the method's code; 1 where the file does not say
+  double cpu_seconds;  // over all processes that worked on the run
   std::string config;  // resolved, TOML
 };
 /// Reads a file of RecordJson. Throws Error when it cannot be read.

@@ -191,8 +191,7 @@ class Run {
         dir_(dir),
         env_(MakeTask(0), config.workers, config.seed),
         algorithm_(parts.make_algorithm(env_.Spec())),
-        stat_names_(algorithm_->StatNames()),
-        logs_(dir, stat_names_, config.eval_every > 0),
+        logs_(dir, algorithm_->StatNames(), config.eval_every > 0),
         progress_(progress, terminal, config.steps) {}
 
   /// Loads the last checkpoint where there is one. `before` is the manifest of the processes
@@ -244,7 +243,8 @@ class Run {
 
   /// Writes what a run of this status leaves behind.
   void Finish(RunStatus status) {
-    LogEpisodes();  // of a rollout that diverged
+    LogEpisodes();       // of a rollout that diverged
+    logs_.EndUpdates();  // a resumed run cuts it off again
     logs_.Flush();
     manifest_.end = Now();
     Stamp(status);
@@ -287,12 +287,9 @@ class Run {
   void Iterate() {
     const std::int64_t before = env_.TotalSteps();
     algorithm_->Collect(env_, episodes_);
-    algorithm_->Update(stats_);
-    Check(stats_.size() == stat_names_.size(), config_.algorithm, ": ", stats_.size(),
-          " numbers for ", stat_names_.size(), " columns of updates.csv");
+    const std::vector<Ratio>& stats = algorithm_->Update();
     LogEpisodes();
-    logs_.AddUpdate(env_.TotalSteps(), stats_);
-    stats_.clear();
+    logs_.AddUpdate(env_.TotalSteps(), stats);
     if (Crossed(config_.eval_every, before, env_.TotalSteps())) LogEvaluation();
   }
 
@@ -340,12 +337,10 @@ class Run {
   int task_ = 0;  // that the workers are on
   VecEnv env_;
   std::unique_ptr<Algorithm> algorithm_;
-  const std::vector<std::string> stat_names_;
   RunLogs logs_;
   Progress progress_;
   Manifest manifest_;
   std::vector<Episode> episodes_;  // of the running iteration
-  std::vector<double> stats_;
   const Clock::time_point begin_ = Clock::now();
   double wall_before_ = 0, cpu_before_ = 0;
 };

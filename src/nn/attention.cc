@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "base/check.h"
-#include "nn/init.h"
 #include "nn/product.h"
 
 namespace o2v {
@@ -23,10 +22,10 @@ MemoryAttention::MemoryAttention(const std::string& name, Index D, Index n_heads
   Check(n_heads > 0 && D % n_heads == 0, name, ": ", n_heads, " heads do not divide D = ", D);
 }
 
-void MemoryAttention::Init(Rng& rng) {
+void MemoryAttention::Init(const Initialiser& init) {
   const Index D = Wq.value.rows();
-  for (Param* W : {&Wq, &Wk, &Wv}) XavierUniform(W->value, D, 3 * D, rng);  // spec 2.6 item 5
-  XavierUniform(W_out.value, rng);
+  for (Param* W : {&Wq, &Wk, &Wv}) init.XavierUniform(W->value, D, 3 * D);  // spec 2.6 item 5
+  init.XavierUniform(W_out.value);
 }
 
 std::vector<Param*> MemoryAttention::Params() {

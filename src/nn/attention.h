@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "base/rng.h"
+#include "nn/init.h"
 #include "nn/param.h"
 
 namespace o2v {
@@ -40,7 +40,7 @@ struct MemoryAttention {
   /// `name`.in.Wq, .Wk, .Wv, .bq, .bk, .bv, `name`.out.W, .b; n_heads divides D.
   MemoryAttention(const std::string& name, Index D, Index n_heads);
   /// In-projections Xavier over the whole (3D, D) block, out-projection Xavier, biases 0.
-  void Init(Rng& rng);
+  void Init(const Initialiser& init);
 
   /// E (D, K) -> memory.
   void Project(const Mat& E, Memory& memory) const;

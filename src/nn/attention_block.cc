@@ -4,7 +4,6 @@
 
 #include "nn/activation.h"
 #include "nn/dropout.h"
-#include "nn/init.h"
 
 namespace o2v {
 namespace {
@@ -51,11 +50,11 @@ AttentionBlock::AttentionBlock(const std::string& attention_name, const std::str
       ffn0(name + ".ffn.0", D, F),
       ffn1(name + ".ffn.1", F, D) {}
 
-void AttentionBlock::Init(Rng& rng) {
-  attention.Init(rng);
+void AttentionBlock::Init(const Initialiser& init) {
+  attention.Init(init);
   for (Linear* layer : {&ffn0, &ffn1}) {
-    XavierUniform(layer->W.value, rng);
-    Uniform(layer->b.value, 1 / std::sqrt(static_cast<double>(layer->W.value.cols())), rng);
+    init.XavierUniform(layer->W.value);
+    init.Uniform(layer->b.value, 1 / std::sqrt(static_cast<double>(layer->W.value.cols())));
   }
 }
 

@@ -38,7 +38,7 @@ struct AttentionBlock {
   AttentionBlock(const std::string& attention_name, const std::string& name, Index D, Index heads,
                  Index F);
   /// Xavier weights; FFN biases U(+-1/sqrt(fan_in)); the rest 0. Source: spec 2.6 item 5.
-  void Init(Rng& rng);
+  void Init(const Initialiser& init);
 
   /// x (D, n) -> cache.out (D, n). masks null: no dropout.
   void Forward(const ConstMatRef& x, const MemoryAttention::Memory& memory, const Masks* masks,

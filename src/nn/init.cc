@@ -37,4 +37,20 @@ void Uniform(Mat& W, double a, Rng& rng) {
   }
 }
 
+void Initialiser::Orthogonal(Mat& W, double gain) const {
+  if (rng_) o2v::Orthogonal(W, gain, *rng_);
+}
+
+void Initialiser::XavierUniform(Mat& W) const {
+  if (rng_) o2v::XavierUniform(W, *rng_);
+}
+
+void Initialiser::XavierUniform(Mat& W, Index fan_in, Index fan_out) const {
+  if (rng_) o2v::XavierUniform(W, fan_in, fan_out, *rng_);
+}
+
+void Initialiser::Uniform(Mat& W, double a) const {
+  if (rng_) o2v::Uniform(W, a, *rng_);
+}
+
 }  // namespace o2v

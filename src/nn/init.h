@@ -18,4 +18,22 @@ void XavierUniform(Mat& W, Rng& rng);
 /// U(-a, a).
 void Uniform(Mat& W, double a, Rng& rng);
 
+/// Gives the weights of a new network their initial values, drawn from a random stream. Without one
+/// they stay zero: of a network that is only to be counted. Drawing is nearly all that making a
+/// network costs.
+class Initialiser {
+ public:
+  Initialiser() = default;
+  /// Draws from `rng`, which is kept. Implicit: a stream is all that a network's maker has.
+  Initialiser(Rng& rng) : rng_(&rng) {}
+
+  void Orthogonal(Mat& W, double gain) const;
+  void XavierUniform(Mat& W) const;
+  void XavierUniform(Mat& W, Index fan_in, Index fan_out) const;
+  void Uniform(Mat& W, double a) const;
+
+ private:
+  Rng* rng_ = nullptr;
+};
+
 }  // namespace o2v

@@ -1,7 +1,5 @@
 #include "nn/mlp.h"
 
-#include "nn/init.h"
-
 namespace o2v {
 namespace {
 
@@ -9,10 +7,11 @@ constexpr double kHeadGain = 1e-3;  // spec 2.1
 
 }  // namespace
 
-Body::Body(const std::string& name, Index n_in, Index h, Activation activation, Rng& rng)
+Body::Body(const std::string& name, Index n_in, Index h, Activation activation,
+           const Initialiser& init)
     : layer0(name + ".0", n_in, h), layer1(name + ".1", h, h), g(activation) {
-  Orthogonal(layer0.W.value, 1, rng);
-  Orthogonal(layer1.W.value, 1, rng);
+  init.Orthogonal(layer0.W.value, 1);
+  init.Orthogonal(layer1.W.value, 1);
 }
 
 void Body::Forward(const ConstMatRef& x, Cache& c) const {
@@ -49,9 +48,9 @@ std::vector<Param*> Body::Params() {
 }
 
 Net::Net(const std::string& body_name, const std::string& head_name, Index n_in, Index h,
-         Index n_out, Activation activation, Rng& rng)
-    : body(body_name, n_in, h, activation, rng), head(head_name, h, n_out) {
-  Orthogonal(head.W.value, kHeadGain, rng);
+         Index n_out, Activation activation, const Initialiser& init)
+    : body(body_name, n_in, h, activation, init), head(head_name, h, n_out) {
+  init.Orthogonal(head.W.value, kHeadGain);
 }
 
 void Net::Forward(const ConstMatRef& x, Cache& c) const {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "base/rng.h"
 #include "nn/activation.h"
+#include "nn/init.h"
 #include "nn/linear.h"
 
 namespace o2v {
@@ -22,7 +22,8 @@ struct Body {
 
   Body() = default;
   /// `name`.0.W, `name`.0.b, `name`.1.W, `name`.1.b; orthogonal weights of gain 1, zero biases.
-  Body(const std::string& name, Index n_in, Index h, Activation activation, Rng& rng);
+  Body(const std::string& name, Index n_in, Index h, Activation activation,
+       const Initialiser& init);
 
   /// x (n_in, B) -> cache.h1 (h, B).
   void Forward(const ConstMatRef& x, Cache& cache) const;
@@ -51,7 +52,7 @@ struct Net {
 
   Net() = default;
   Net(const std::string& body_name, const std::string& head_name, Index n_in, Index h, Index n_out,
-      Activation activation, Rng& rng);
+      Activation activation, const Initialiser& init);
 
   /// x (n_in, B) -> cache.out.
   void Forward(const ConstMatRef& x, Cache& cache) const;

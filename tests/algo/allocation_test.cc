@@ -21,12 +21,11 @@ long Allocations(const EnvEntry& task, const std::string& method, Fidelity fidel
   env.Reset();
   const auto algorithm = MakeRunAlgorithm(config, env.Spec());
   std::vector<Episode> episodes;
-  std::vector<double> stats;
   episodes.reserve(1000);
   const auto train = [&](int iterations) {
     for (int i = 0; i < iterations; ++i) {
       algorithm->Collect(env, episodes);
-      algorithm->Update(stats);
+      algorithm->Update();
     }
   };
   train(1);

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "algo/method.h"
 #include "algo/setup.h"
 
 namespace o2v {
@@ -50,6 +51,42 @@ TEST(Statistics, OfTheOptionCriticsShowTheirTerminations) {
     // beta = 1/2 at the start, differences of q are of the order of its head's gain 1e-3, and 2 of
     // the 24 samples are first states: 1/2 * 2 * 22 / 24.
     EXPECT_NEAR(Stat(*algorithm, stats, "termination_all"), 22.0 / 24, 0.03) << method;
+  }
+}
+
+TEST(OptionUsage, IsTheSameWhereverRolloutsCutIt) {
+  // Option 0 is executed for 3 and 3 steps, option 1 for 2, option 2 never; the ninth step begins
+  // an episode, and with it an execution of option 0 of 1 step: means 7 / 3 and 2.
+  const std::vector<int> o = {0, 0, 0, 1, 1, 0, 0, 0, 0};
+  for (const int rollout : {1, 2, 4, 9}) {
+    OptionUsage usage(3);
+    std::vector<Ratio> sums(6), ratios;
+    for (int t = 0; t < int(o.size()); ++t) {
+      usage.Count(o[std::size_t(t)], t > 0 ? o[std::size_t(t - 1)] : 0, t == 0 || t == 8);
+      if ((t + 1) % rollout != 0 && t + 1 < int(o.size())) continue;
+      ratios.clear();
+      usage.Report(ratios);
+      usage.Clear();
+      ASSERT_EQ(ratios.size(), sums.size());
+      for (std::size_t i = 0; i < sums.size(); ++i) {
+        sums[i].sum += ratios[i].sum;
+        sums[i].n += ratios[i].n;
+      }
+    }
+    std::vector<double> values;
+    for (const Ratio& sum : sums) values.push_back(sum.Value());
+    EXPECT_EQ(values, (std::vector<double>{7.0 / 9, 2.0 / 9, 0, 7.0 / 3, 2, 0})) << rollout;
+  }
+}
+
+TEST(Statistics, AreAsManyAsTheirNames) {
+  for (const AlgorithmEntry& method : AlgorithmRegistry()) {
+    const RunConfig config = SmallConfig(method.id, Fidelity::kPaper);
+    VecEnv env = PointTask(config.workers, /*time_limit=*/5);
+    const auto algorithm = MakeRunAlgorithm(config, env.Spec());
+    for (int update = 0; update < 2; ++update) {
+      EXPECT_EQ(Iterate(*algorithm, env).size(), algorithm->StatNames().size()) << method.id;
+    }
   }
 }
 

@@ -78,15 +78,16 @@ TEST(LossMeans, AverageTheMinibatches) {
   means.Add(terms, 2);
   terms.total = 5;
   means.Add(terms, 4);
-  std::vector<double> stats;
+  std::vector<Ratio> ratios;
   std::vector<std::string> names;
-  means.Report(stats);
+  means.Report(ratios);
   LossMeans::Names("low", names);
-  ASSERT_EQ(stats.size(), names.size());
+  ASSERT_EQ(ratios.size(), names.size());
   EXPECT_EQ(names.front(), "loss_low");
-  EXPECT_EQ(stats.front(), 3);
+  EXPECT_EQ(ratios.front().n, 2);
+  EXPECT_EQ(ratios.front().Value(), 3);
   EXPECT_EQ(names.back(), "grad_norm_low");
-  EXPECT_EQ(stats.back(), 3);
+  EXPECT_EQ(ratios.back().Value(), 3);
 }
 
 TEST(LossMeans, HaveTheColumnsOfAMethodBesideTheirOwn) {
@@ -100,14 +101,16 @@ TEST(LossMeans, HaveTheColumnsOfAMethodBesideTheirOwn) {
   means.Clear();
   terms.termination = 8;
   means.Add(terms, 1);
-  std::vector<double> stats;
+  std::vector<Ratio> ratios;
   std::vector<std::string> names;
-  means.Report(stats);
+  means.Report(ratios);
   LossMeans::Names("all", names, more);
   EXPECT_EQ(names, (std::vector<std::string>{"loss_all", "surrogate_all", "value_loss_all",
                                              "entropy_all", "kl_all", "clip_fraction_all",
                                              "master_all", "termination_all", "grad_norm_all"}));
-  EXPECT_EQ(stats, (std::vector<double>{0, 0, 0, 0, 0, 0, 2, 8, 1}));
+  std::vector<double> values;
+  for (const Ratio& ratio : ratios) values.push_back(ratio.Value());
+  EXPECT_EQ(values, (std::vector<double>{0, 0, 0, 0, 0, 0, 2, 8, 1}));
 }
 
 }  // namespace

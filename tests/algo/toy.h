@@ -100,9 +100,9 @@ inline VecEnv PointTask(int workers, int time_limit, double scale = 1) {
 /// One rollout and the update on it; the update's statistics.
 inline std::vector<double> Iterate(Algorithm& algorithm, VecEnv& env) {
   std::vector<Episode> episodes;
-  std::vector<double> stats;
   algorithm.Collect(env, episodes);
-  algorithm.Update(stats);
+  std::vector<double> stats;
+  for (const Ratio& ratio : algorithm.Update()) stats.push_back(ratio.Value());
   return stats;
 }
 

@@ -63,5 +63,15 @@ TEST_F(Files, NameFileAndReasonWhenTheyCannotBeWritten) {
             (dir_ / "x").string() + ": cannot replace: Is a directory");
 }
 
+TEST_F(Files, NameFileAndReasonWhenTheyCannotBeSynced) {
+  WriteFileAtomically(dir_ / "x", "text");
+  SyncFile(dir_ / "x");
+  EXPECT_EQ(ReadFile(dir_ / "x"), "text");
+  EXPECT_EQ(MessageOf([&] { SyncFile(dir_ / "none"); }),
+            (dir_ / "none").string() + ": cannot open: No such file or directory");
+  EXPECT_EQ(MessageOf([] { SyncFile("/dev/null"); }),  // no disk behind it
+            "/dev/null: cannot write to the disk: Invalid argument");
+}
+
 }  // namespace
 }  // namespace o2v

@@ -54,7 +54,7 @@ bool OneLine(const std::string& text) {
 TEST_F(Program, HelpWithExamplesSucceedsForEverySubcommand) {
   EXPECT_EQ(Run("--help").code, 0);
   for (const char* name :
-       {"list", "train", "eval", "forward", "params", "replay", "jobs", "summary"}) {
+       {"list", "train", "eval", "forward", "interpret", "params", "replay", "jobs", "summary"}) {
     const Outcome outcome = Run(std::string(name) + " --help");
     EXPECT_EQ(outcome.code, 0) << name;
     EXPECT_NE(outcome.out.find("Example"), std::string::npos) << name;
@@ -64,7 +64,8 @@ TEST_F(Program, HelpWithExamplesSucceedsForEverySubcommand) {
 TEST_F(Program, WrongUsageExitsWith2AndOneLine) {
   for (const char* arguments :
        {"", "fly", "train", "train --task Hopper-v2 --algo ppo", "list", "list shoes",
-        "train --out r --seed x", "eval --checkpoint x --episodes 0", "params --frob"}) {
+        "train --out r --seed x", "eval --checkpoint x --episodes 0", "interpret",
+        "interpret x --delta 0", "params --frob"}) {
     const Outcome outcome = Run(arguments);
     EXPECT_EQ(outcome.code, 2) << arguments;
     EXPECT_PRED1(OneLine, outcome.err) << arguments;
@@ -78,7 +79,7 @@ TEST_F(Program, ConfigErrorsExitWith2AndOneLine) {
         "train --task Hopper-v2 --algo ppo --out r --config absent.toml",
         "train --task Hopper-v2 --algo ppo --out r --seed -1", "jobs absent", "jobs run",
         "jobs quick --seeds a", "jobs quick --tasks Hoper-v2", "summary absent",
-        "replay --task Hopper-v2 --trajectory absent.csv"}) {
+        "replay --task Hopper-v2 --trajectory absent.csv", "interpret absent", "interpret ."}) {
     const Outcome outcome = Run(arguments);
     EXPECT_EQ(outcome.code, 2) << arguments << "\n" << outcome.err;
     EXPECT_PRED1(OneLine, outcome.err) << arguments;
@@ -149,6 +150,59 @@ TEST_F(Program, WritesNetworkOutputs) {
   EXPECT_EQ(table.At(0, 0), 1) << "one option";
 }
 
+TEST_F(Program, InterpretsTheEmbeddingRepeatably) {
+  ASSERT_EQ(Run("train --task InvertedPendulum-v2 --algo option2vec --seed 3 --steps 256 "
+                "--set rollout=64 --out run")
+                .code,
+            0);
+  const Outcome outcome = Run("interpret run --episodes 2");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const std::string path = "results/interpret/paper/InvertedPendulum-v2/option2vec/seed-003.csv";
+  EXPECT_TRUE(outcome.out.starts_with(path + ": 40 dimensions, ")) << outcome.out;
+  EXPECT_NE(outcome.out.find("of 2 episodes on InvertedPendulum-v2\n"), std::string::npos);
+  const CsvTable table = ReadCsv(dir_ / path);
+  EXPECT_EQ(table.columns,
+            (std::vector<std::string>{"dimension", "embedding_0", "embedding_1", "embedding_2",
+                                      "embedding_3", "effect_0", "perturbed_0", "delta"}));
+  EXPECT_EQ(table.Rows(), 40u);
+  ASSERT_EQ(Run("interpret run/last.ckpt --episodes 2 --out new/b.csv").code, 0);
+  EXPECT_EQ(ReadFile(dir_ / "new/b.csv"), ReadFile(dir_ / path));
+  ASSERT_EQ(Run("interpret run --episodes 2 --seed 1 --out c.csv").code, 0);
+  EXPECT_NE(ReadFile(dir_ / "c.csv"), ReadFile(dir_ / path));
+}
+
+TEST_F(Program, InterpretsTheLastTaskOfAPairUnlessToldOtherwise) {
+  ASSERT_EQ(
+      Run("train --task CartPole --algo option2vec --steps 256 --set rollout=32 --out run").code,
+      0);
+  for (const char* task : {"dm-cartpole-balance_sparse", "dm-cartpole-balance"}) {
+    const bool last = task == std::string("dm-cartpole-balance_sparse");
+    const Outcome outcome = Run(std::string("interpret run --episodes 1") +
+                                (last ? "" : " --task ") + (last ? "" : task));
+    EXPECT_EQ(outcome.out, std::string("results/interpret/paper/") + task +
+                               "/option2vec/seed-000.csv: 40 dimensions, 1000 states of 1 episodes "
+                               "on " +
+                               task + "\n")
+        << outcome.err;
+  }
+}
+
+TEST_F(Program, InterpretsOption2VecOnly) {
+  ASSERT_EQ(Train("--out run").code, 0);
+  const Outcome other = Run("interpret run");
+  EXPECT_EQ(other.code, 2);
+  EXPECT_EQ(other.err, "option2vec: run/last.ckpt: made by ppo, whose options have no embedding\n");
+  EXPECT_EQ(Run("interpret run --algo option2vec").code, 2) << "the file says ppo";
+  // A file from elsewhere: an empty header, then one that holds nothing of Option2Vec.
+  WriteFileAtomically(dir_ / "x", std::string("\2\0\0\0\0\0\0\0{}", 10));
+  EXPECT_EQ(Run("interpret x").code, 2) << "it does not say what it is";
+  const Outcome foreign = Run("interpret x --task Hopper-v2 --algo option2vec --out y.csv");
+  EXPECT_EQ(foreign.code, 1);
+  EXPECT_NE(foreign.err.find("x: embed.W_o is missing"), std::string::npos) << foreign.err;
+  EXPECT_FALSE(fs::exists(dir_ / "y.csv"));
+  EXPECT_FALSE(fs::exists(dir_ / "results"));
+}
+
 TEST_F(Program, ReplayPassesOnItsOwnOutputAndFailsOnAnother) {
   WriteFileAtomically(dir_ / "in.csv",
                       "step,ctrl0,qpos0,qpos1,qvel0,qvel1\n0,1,0,0.1,0,0\n1,1,0,0,0,0\n");
@@ -172,7 +226,9 @@ TEST_F(Program, JobsRunThenDisappearThenSummarise) {
   EXPECT_EQ(std::system(("cd '" + dir_.string() + "' && sh -e stdout 2> /dev/null").c_str()), 0);
   const Outcome again = Run("jobs tiny.toml");
   EXPECT_EQ(again.out, "");
-  EXPECT_NE(again.err.find("seed-001: done"), std::string::npos) << again.err;
+  EXPECT_EQ(again.err, "");
+  const Outcome progress = Run("progress tiny.toml");
+  EXPECT_EQ(progress.out, "2 runs: 2 done, 0 left\n");
   const Outcome summary = Run("summary results/tiny");
   EXPECT_EQ(summary.code, 0) << summary.err;
   EXPECT_NE(summary.out.find("authors"), std::string::npos);

@@ -26,20 +26,19 @@ TEST_P(PaperConfigs, EveryRunOfTheFirstSeedMakesTwoUpdates) {
     auto algorithm = parts.make_algorithm(env.Spec());
     env.Reset();
     std::vector<Episode> episodes;
-    std::vector<double> stats;
     for (int update = 0; update < 2; ++update) {
-      stats.clear();
       algorithm->Collect(env, episodes);
-      algorithm->Update(stats);
+      for (const Ratio& x : algorithm->Update()) {
+        EXPECT_TRUE(std::isfinite(x.Value())) << job.command;
+      }
     }
-    for (const double x : stats) EXPECT_TRUE(std::isfinite(x)) << job.command;
     if (!rollouts) continue;
     EXPECT_EQ(env.TotalSteps(), 2 * 32 * job.config.workers) << job.command;
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Embedded, PaperConfigs,
-                         testing::Values("quick", "ci", "single_task", "transfer"),
+                         testing::Values("quick", "ci", "single_task", "transfer", "ablation"),
                          [](const auto& info) { return std::string(info.param); });
 
 }  // namespace

@@ -37,7 +37,8 @@ struct Trained {
   Trained(Algorithm& algorithm, VecEnv& env, int steps) {
     while (env.TotalSteps() < steps) {
       algorithm.Collect(env, episodes);
-      algorithm.Update(updates.emplace_back());
+      std::vector<double>& stats = updates.emplace_back();
+      for (const Ratio& ratio : algorithm.Update()) stats.push_back(ratio.Value());
     }
   }
   double First() const { return MeanReturn(episodes, 0, 20); }

@@ -46,15 +46,14 @@ void Run(const std::string& task, const std::string& method, Fidelity fidelity, 
   const auto algorithm = MakeAlgorithm(method, in);
   const std::string name = task + "/" + method + "/" + ToString(fidelity) + "/";
   std::vector<Episode> episodes;
-  std::vector<double> stats;
   env.Reset();
   for (int iteration = 0; iteration < 2; ++iteration) {
     algorithm->Collect(env, episodes);
-    algorithm->Update(stats);
+    const std::vector<Ratio>& stats = algorithm->Update();
     const std::vector<std::string> columns = algorithm->StatNames();
     ASSERT_EQ(columns.size(), stats.size());
     for (std::size_t i = 0; i < stats.size(); ++i) {
-      out.emplace_back(name + std::to_string(iteration) + "/" + columns[i], stats[i]);
+      out.emplace_back(name + std::to_string(iteration) + "/" + columns[i], stats[i].Value());
     }
     for (Index i = 0; i < env.States().size(); ++i) {
       out.emplace_back(name + std::to_string(iteration) + "/s" + std::to_string(i),

@@ -72,8 +72,8 @@ class KilledAlgorithm final : public Algorithm {
   KilledAlgorithm(std::unique_ptr<Algorithm> algorithm, Killer& killer, long delay)
       : algorithm_(std::move(algorithm)), killer_(killer), delay_(delay) {}
 
-  void Update(std::vector<double>& stats) override {
-    if (!killer_.Due()) return algorithm_->Update(stats);
+  const std::vector<Ratio>& Update() override {
+    if (!killer_.Due()) return algorithm_->Update();
     sigevent event{};
     event.sigev_notify = SIGEV_SIGNAL;
     event.sigev_signo = SIGKILL;
@@ -81,8 +81,9 @@ class KilledAlgorithm final : public Algorithm {
     Check(::timer_create(CLOCK_MONOTONIC, &event, &timer) == 0, "no timer");
     const itimerspec when{{0, 0}, {0, delay_}};
     Check(::timer_settime(timer, 0, &when, nullptr) == 0, "no timer");
-    algorithm_->Update(stats);
+    const std::vector<Ratio>& stats = algorithm_->Update();
     ::raise(SIGKILL);  // the update was faster
+    return stats;
   }
 
   void Collect(VecEnv& env, std::vector<Episode>& e) override { algorithm_->Collect(env, e); }

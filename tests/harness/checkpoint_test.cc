@@ -18,11 +18,10 @@ struct State {
   explicit State(std::uint64_t seed, int rollouts = 3)
       : env([] { return std::make_unique<FakeEnv>(); }, 2, seed), algorithm(env.Spec(), seed) {
     env.Reset();
-    std::vector<double> stats;
     std::vector<Episode> episodes;
     for (int i = 0; i < rollouts; ++i) {
       algorithm.Collect(env, episodes);
-      algorithm.Update(stats);
+      algorithm.Update();
     }
   }
   StateWalk Walk() {

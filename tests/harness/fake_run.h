@@ -72,13 +72,13 @@ class FakeAlgorithm : public Algorithm {
       reward_ += transition_.r.sum();
     }
   }
-  void Update(std::vector<double>& stats) override {
+  const std::vector<Ratio>& Update() override {
     if (in_update) in_update();
     const double nudge = 0.01 * reward_ * rng_.Normal();
     W_.value.array() += static_cast<Real>(nudge);
     b_.value.array() -= static_cast<Real>(nudge);
     ++updates_;
-    stats = {reward_, nudge};
+    return ratios_ = {{reward_, 1}, {nudge, 1}};
   }
   std::vector<std::string> StatNames() const override { return {"reward", "nudge"}; }
   std::vector<Param*> Params() override { return {&W_, &b_}; }
@@ -123,6 +123,7 @@ class FakeAlgorithm : public Algorithm {
   Param W_, b_;
   Transition transition_;
   double reward_ = 0;
+  std::vector<Ratio> ratios_;
   std::int64_t updates_ = 0;
 };
 

@@ -27,7 +27,7 @@ class Jobs : public testing::Test {
     return query;
   }
   /// Leaves behind what a run with this status does.
-  void Leave(const Job& job, RunStatus status, int revision = 1) const {
+  void Leave(const Job& job, RunStatus status, int revision = 1, double cpu_seconds = 0) const {
     fs::create_directories(job.dir);
     WriteFileAtomically(job.dir / "config.toml", ToToml(job.config));
     Manifest manifest;
@@ -35,6 +35,7 @@ class Jobs : public testing::Test {
     WriteManifest(job.dir, manifest);
     if (status != RunStatus::kDone && status != RunStatus::kDiverged) return;
     manifest.revision = revision;
+    manifest.cpu_seconds = cpu_seconds;
     WriteFileAtomically(RecordPath(job.dir, ".json"),
                         RecordJson(ManifestJson(manifest), ToToml(job.config)));
   }
@@ -76,6 +77,71 @@ TEST_F(Jobs, OfSeveralExperimentsGoSeedBySeedToo) {
   ASSERT_EQ(jobs.size(), 2u * (10 + 6));
   for (std::size_t i = 0; i < jobs.size(); ++i) EXPECT_EQ(jobs[i].config.seed, i < 16 ? 3u : 5u);
   EXPECT_EQ(jobs[10].dir, results_ / "transfer/paper/CartPole/ppo/seed-003");
+}
+
+TEST_F(Jobs, OfSeveralExperimentsTakeTheTasksThatAreTheirs) {
+  JobQuery query = Query();
+  query.configs = {"single_task", "transfer"};
+  query.algorithms = {"ppo"};
+  query.fidelities = {"paper"};
+  query.seeds = {0};
+  query.tasks = {"Ant-v2", "Fish"};
+  const auto jobs = ListJobs(query);
+  ASSERT_EQ(jobs.size(), 2u);
+  EXPECT_EQ(jobs[0].dir, results_ / "single_task/paper/Ant-v2/ppo/seed-000");
+  EXPECT_EQ(jobs[1].dir, results_ / "transfer/paper/Fish/ppo/seed-000");
+  query.tasks = {"Ant-v2", "dm-fish-upright"};
+  EXPECT_THROW(ListJobs(query), ConfigError);
+}
+
+TEST_F(Jobs, OfAnAblationTurnOneSwitchEach) {
+  JobQuery query = Query();
+  query.configs = {"ablation"};
+  query.results = "results";
+  query.tasks = {"Hopper-v2"};
+  query.algorithms = {"option2vec"};
+  query.seeds = {0};
+  const auto jobs = ListJobs(query);
+  // Two of the seven switches concern the method; each in both fidelities.
+  ASSERT_EQ(jobs.size(), 4u);
+  EXPECT_EQ(
+      jobs[0].command,
+      "./option2vec train --config ablation --task Hopper-v2 --algo option2vec --fidelity paper "
+      "--set timelimit=released --seed 0 --steps 1000000 --out "
+      "results/ablation/paper-timelimit=released/Hopper-v2/option2vec/seed-000 --resume");
+  EXPECT_EQ(jobs[3].dir,
+            "results/ablation/released-o2v_option_in_update=paper/Hopper-v2/option2vec/seed-000");
+  Switches one_turned = SwitchesFor(Fidelity::kReleased);
+  one_turned.o2v_option_in_update = Fidelity::kPaper;
+  EXPECT_EQ(jobs[3].config.switches.o2v_option_in_update, Fidelity::kPaper);
+  for (const SwitchInfo& info : SwitchRegistry()) {
+    if (!Concerns(info, jobs[3].config)) continue;
+    EXPECT_EQ(SwitchValue(jobs[3].config.switches, info), SwitchValue(one_turned, info))
+        << info.name;
+  }
+}
+
+TEST_F(Jobs, ProgressIsWhatFinishedRunsOfTheKindTook) {
+  JobQuery query = Query();  // 2 tasks, 2 methods, 2 seeds; pendulum 0.3M steps, cheetah 1M
+  const auto before = ListJobs(query);
+  EXPECT_EQ(ToString(MeasureProgress(before), 2),
+            "8 runs: 0 done, 8 left, time left known after the first");
+  Leave(before[0], RunStatus::kDone, 1, 720);      // pendulum, ppo, seed 0
+  Leave(before[1], RunStatus::kDiverged, 1, 1e9);  // pendulum, option2vec, seed 0
+  const Progress some = MeasureProgress(ListJobs(query));
+  EXPECT_EQ(some.finished, 2);
+  EXPECT_EQ(some.timed, 1);
+  EXPECT_EQ(some.kinds, 4);
+  // Left: both of pendulum's second seed at 720 s, four of cheetah at 720 s * 1M / 0.3M.
+  EXPECT_NEAR(some.cpu_seconds_left.value(), 2 * 720 + 4 * 2400, 1e-6);
+  Leave(before[2], RunStatus::kDone, 1, 3600);  // cheetah, ppo, seed 0
+  EXPECT_NEAR(MeasureProgress(ListJobs(query)).cpu_seconds_left.value(), 2 * 720 + 3 * 3600, 1e-6);
+  EXPECT_EQ(
+      ToString(MeasureProgress(ListJobs(query)), 2),
+      "8 runs: 3 done (1 diverged), 5 left, about 3.4 CPU hours, 1.7 h with 2 at a time (2 of 4 "
+      "kinds of runs timed, the rest guessed from these)");
+  for (const Job& job : before) Leave(job, RunStatus::kDone, 1, 1);
+  EXPECT_EQ(ToString(MeasureProgress(ListJobs(query)), 2), "8 runs: 8 done, 0 left");
 }
 
 TEST_F(Jobs, QuoteWordsForTheShell) {
@@ -147,7 +213,7 @@ TEST_F(Jobs, ARunFinishedWithAnotherConfigIsRefused) {
 }
 
 TEST_F(Jobs, EveryExperimentOfTheProgramResolves) {
-  for (const char* name : {"quick", "ci", "single_task", "transfer"}) {
+  for (const char* name : {"quick", "ci", "single_task", "transfer", "ablation"}) {
     JobQuery query = Query();
     query.configs = {name};
     EXPECT_FALSE(ListJobs(query).empty()) << name;

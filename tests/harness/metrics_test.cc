@@ -4,6 +4,7 @@
 
 #include "base/hash.h"
 #include "fake_run.h"
+#include "memory_visitor.h"
 
 namespace o2v {
 namespace {
@@ -88,13 +89,75 @@ TEST(RunLogs, WriteTheirColumns) {
                    .length = 7,
                    .terminated = true,
                    .truncated = false});
-  logs.AddUpdate(2048, std::vector<double>{1.5, 1e-9});
+  logs.AddUpdate(2048, std::vector<Ratio>{{3, 2}, {1e-9, 1}});
   logs.AddEval(2048, 0, 3);
   logs.Flush();
   EXPECT_EQ(ReadFile(dir / "episodes.csv"),
             "step,worker,return,length,terminated,truncated\n1000000,1,-0.1,7,1,0\n");
   EXPECT_EQ(ReadFile(dir / "updates.csv"), "step,loss,kl\n2048,1.5,1e-09\n");
   EXPECT_EQ(ReadFile(dir / "evals.csv"), "step,episode,return\n2048,0,3\n");
+}
+
+TEST(CsvLog, ThatCannotBeBroughtToTheDiskIsAnErrorWithItsName) {
+  CsvLog log("/dev/null", "step,x");  // takes every row, but has no disk
+  log.Create();
+  log.Row({"1", "0.5"});
+  try {
+    log.Flush();
+    FAIL() << "flushed";
+  } catch (const Error& e) {
+    EXPECT_TRUE(std::string(e.what()).starts_with("/dev/null: ")) << e.what();
+  }
+}
+
+/// updates.csv after the updates of this test, of which a checkpoint is taken after `seen`: those
+/// after it are lost, and made again by another process. -1: none is.
+std::string UpdatesOf(int seen) {
+  TestFolder dir;
+  const std::vector<std::string> columns = {"loss", "duration"};
+  RunLogs first(dir / "", columns, /*evals=*/false), second(dir / "", columns, /*evals=*/false);
+  RunLogs* logs = &first;
+  MemoryVisitor checkpoint;
+  const std::vector<std::pair<std::int64_t, std::vector<Ratio>>> updates = {
+      {2048, {{6, 2}, {2048, 3}}},  // a row of its own
+      {4095, {{1, 1}, {2, 0}}},     // 2047 steps: none yet
+      {4100, {{9, 3}, {40, 1}}},    // 2052 steps: row of both
+      {4105, {{5, 1}, {5, 0}}},
+      {8000, {{3, 1}, {3, 0}}},  // no execution began: the steps themselves
+      {8005, {{7, 1}, {5, 2}}}};
+  logs->Create();
+  for (int i = 0; i < int(updates.size()); ++i) {
+    if (i == seen) {
+      first.Flush();
+      first.Visit(checkpoint);
+      first.AddUpdate(9999, std::vector<Ratio>{{-1, 1}, {-1, 1}});
+      first.Flush();
+      checkpoint.load = true;
+      second.Visit(checkpoint);
+      second.Resume();
+      logs = &second;
+    }
+    logs->AddUpdate(updates[std::size_t(i)].first, updates[std::size_t(i)].second);
+  }
+  logs->EndUpdates();
+  logs->EndUpdates();  // nothing is left
+  logs->Flush();
+  return ReadFile(dir / "updates.csv");
+}
+
+TEST(RunLogs, PutSmallUpdatesTogether) {
+  // Durations are steps by executions: 42 / 1, not the mean of 2 and 40.
+  const std::string expected =
+      "step,loss,duration\n2048,3,682.6666666666666\n4100,2.5,42\n8000,4,8\n8005,7,2.5\n";
+  EXPECT_EQ(UpdatesOf(-1), expected);
+  for (int seen = 0; seen < 6; ++seen) EXPECT_EQ(UpdatesOf(seen), expected) << seen;
+}
+
+TEST(RunLogs, RefuseAnUpdateOfOtherColumns) {
+  TestFolder dir;
+  RunLogs logs(dir / "", {"loss"}, /*evals=*/false);
+  logs.Create();
+  EXPECT_THROW(logs.AddUpdate(1, std::vector<Ratio>(2)), Error);
 }
 
 TEST(RunLogs, WriteNoEvaluationsWhenOff) {

@@ -16,7 +16,7 @@ namespace {
 
 const std::filesystem::path kFile = std::filesystem::path(O2V_TEST_DATA) / "golden/params.csv";
 
-/// The table on record. Making it takes seconds, so that only one test does.
+/// The table on record, which one test compares with the one that the program makes.
 std::vector<ParamRow> Recorded() {
   std::istringstream file(ReadFile(kFile));
   std::vector<ParamRow> rows;

@@ -55,8 +55,10 @@ TEST(RecordJson, HoldsConfigBuildRevisionAndCostButNoDate) {
 
 TEST(ReadRecord, OfBeforeThereWereRevisionsIsOfTheFirst) {
   TestFolder dir;
-  WriteFileAtomically(dir / "a.json", R"({"status": "done", "steps": 7, "config": ""})");
+  WriteFileAtomically(dir / "a.json",
+                      R"({"status": "done", "steps": 7, "cpu_seconds": 1.5, "config": ""})");
   EXPECT_EQ(ReadRecord(dir / "a.json").revision, 1);
+  EXPECT_EQ(ReadRecord(dir / "a.json").cpu_seconds, 1.5);
   Manifest manifest;
   manifest.revision = 2;
   WriteFileAtomically(dir / "b.json", RecordJson(ManifestJson(manifest), ""));

@@ -61,10 +61,8 @@ TEST_F(Trainer, LeavesAWholeFolderAndItsRecord) {
   EXPECT_EQ(ReadFile(dir_ / "run" / "config.toml"), ToToml(config_));
   EXPECT_TRUE(ReadFile(dir_ / "run.csv").starts_with("step,return_20\n200,"));
   EXPECT_TRUE(fs::exists(dir_ / "run.json"));
-  // 20 iterations of 5 x 2 steps, two evaluations at 50, 100, 150 and 200.
-  const std::string updates = ReadFile(dir_ / "run" / "updates.csv");
-  EXPECT_TRUE(updates.starts_with("step,reward,nudge\n10,"));
-  EXPECT_EQ(std::count(updates.begin(), updates.end(), '\n'), 1 + 20);
+  // 20 iterations of 5 x 2 steps are less than a row; two evaluations at 50, 100, 150 and 200.
+  EXPECT_TRUE(ReadFile(dir_ / "run" / "updates.csv").starts_with("step,reward,nudge\n200,"));
   const std::string evals = ReadFile(dir_ / "run" / "evals.csv");
   EXPECT_EQ(std::count(evals.begin(), evals.end(), '\n'), 1 + 8);
 }
@@ -79,10 +77,8 @@ TEST_F(Trainer, ChecksPointsAtTheFirstBoundaryAfterEachMultipleAndAtTheEnd) {
   config_.checkpoint_every = 45;
   std::vector<std::int64_t> steps;
   RunHooks hooks;
-  hooks.before_checkpoint = [&] {
-    const std::string updates =
-        ReadFile(dir_ / "run" / "updates.csv");  // flushed: ends with the step
-    steps.push_back(10 * (std::count(updates.begin(), updates.end(), '\n') - 1));
+  hooks.before_rename = [&] {
+    steps.push_back(std::stoll(ReadMetadata(dir_ / "run" / "last.ckpt.tmp").at("total_steps")));
   };
   Start("run", hooks);
   EXPECT_EQ(steps, (std::vector<std::int64_t>{50, 90, 140, 180, 200}));
@@ -108,14 +104,39 @@ TEST_F(Trainer, EvaluationsDoNotChangeTraining) {
   }
 }
 
+TEST_F(Trainer, FlushesItsLogsBeforeACheckpoint) {
+  config_.eval_every = 10;
+  int checkpoints = 0;
+  RunHooks hooks;
+  hooks.before_checkpoint = [&] {
+    const std::string evals = ReadFile(dir_ / "run" / "evals.csv");  // two after every iteration
+    ++checkpoints;
+    EXPECT_EQ(std::count(evals.begin(), evals.end(), '\n'), 1 + 2 * std::min(3 * checkpoints, 20));
+  };
+  Start("run", hooks);
+  EXPECT_EQ(checkpoints, 7);
+}
+
+TEST_F(Trainer, PutsSmallUpdatesIntoRows) {
+  config_.steps = 5000;
+  Start("run");
+  const CsvTable updates = ReadUpdates(dir_ / "run" / "updates.csv");
+  ASSERT_EQ(updates.Rows(), 3u);
+  for (std::size_t row = 0; row < 3; ++row) {  // 205 updates, 205 more, and the rest
+    EXPECT_EQ(updates.At(row, 0), std::min(2050.0 * double(row + 1), 5000.0));
+  }
+}
+
 TEST_F(Trainer, GoesOnFromAnInterruptionAnywhere) {
+  config_.steps = 5000;  // rows of updates.csv at 2050, 4100 and 5000
+  config_.checkpoint_every = 750;
   Start("whole");
   for (int moment = 0; moment < 3; ++moment) {
-    for (int n = 1; n <= 7; ++n) {  // 7 checkpoints: after 30, 60, ..., 180 and 200 steps
+    for (int n = 1; n <= 7; ++n) {  // 7 checkpoints: after 750, 1500, ..., 4500 and 5000 steps
       const std::string name = std::to_string(moment) + "-" + std::to_string(n);
       int count = 0;
       const auto interrupt = [&] {
-        if (++count == n) throw Interrupt();
+        if (++count == (moment == 2 ? 70 * n : n)) throw Interrupt();
       };
       RunHooks hooks;
       RunParts parts = parts_;
@@ -249,8 +270,9 @@ TEST_F(Trainer, KeepsWhatADivergedRunHas) {
   EXPECT_EQ(manifest.status, RunStatus::kDiverged);
   EXPECT_EQ(manifest.steps, 98);
   EXPECT_TRUE(fs::exists(dir_ / "run.csv"));
-  const std::string updates = ReadFile(dir_ / "run" / "updates.csv");
-  EXPECT_EQ(std::count(updates.begin(), updates.end(), '\n'), 1 + 9);
+  const CsvTable updates = ReadUpdates(dir_ / "run" / "updates.csv");
+  ASSERT_EQ(updates.Rows(), 1u);  // of the nine updates before
+  EXPECT_EQ(updates.At(0, 0), 90);
   EXPECT_EQ(Refused([&] { Resume("run"); }), (dir_ / "run").string() + ": this run is diverged");
 }
 

@@ -60,6 +60,21 @@ TEST(XavierUniform, FillsItsInterval) {
   EXPECT_NEAR(W.mean(), 0, 5 * a / std::sqrt(3.0 * 600));  // five standard errors
 }
 
+TEST(Initialiser, DrawsFromItsStreamAndWithoutOneNothing) {
+  Rng a(8, "test"), b(8, "test");
+  Mat drawn(4, 3), expected(4, 3), blank = Mat::Zero(4, 3);
+  Initialiser(a).Orthogonal(drawn, 2);
+  Orthogonal(expected, 2, b);
+  EXPECT_EQ(drawn, expected);
+  Initialiser(a).XavierUniform(drawn);
+  XavierUniform(expected, b);
+  EXPECT_EQ(drawn, expected);
+  EXPECT_EQ(a.Bits(), b.Bits());
+  Initialiser().Orthogonal(blank, 2);
+  Initialiser().XavierUniform(blank);
+  EXPECT_TRUE(blank.isZero(0));
+}
+
 TEST(Body, StartsOrthogonalWithZeroBiases) {
   Rng rng(6, "test");
   Body body("net", 5, 8, Activation::kTanh, rng);

@@ -198,6 +198,11 @@ class OtherTest(unittest.TestCase):
             path = Path("results/interpret/paper/Hopper-v2/option2vec/seed-000.csv")
             evidence = Evidence("paper", {}, effects={path: effects})
             self.assertEqual(judged("Embeddings", evidence)[0], expected)
+            # A task with one action, which is every dimension's primary action, says nothing.
+            evidence.effects[Path("pendulum")] = np.ones((12, 1))
+            self.assertEqual(judged("Embeddings", evidence)[0], expected)
+            evidence.effects.pop(path)
+            self.assertEqual(judged("Embeddings", evidence)[0], UNMEASURED)
 
     def test_the_authors_logs_say_what_is_known_of_them(self):
         # Welch's p of these comparisons, worked out from the logs on their own: HalfCheetah

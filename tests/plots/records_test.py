@@ -7,7 +7,7 @@ import numpy as np
 
 from plots.records import DamagedFile, Key, load_cells
 from plots.samples import author_samples, mean_duration, our_samples
-from plots.tables import read_bench, read_rows, read_switches
+from plots.tables import read_bench, read_interpretations, read_rows, read_switches
 from tree import ROOT, write_run
 
 TASK = "Hopper-v2"
@@ -182,6 +182,27 @@ class TablesTest(InFolder):
                          ("timelimit", "paper, released", "bootstrap | terminal"))
         (self.results / "switches.txt").write_text("switch  old  new  takes  methods  effect\n")
         self.refuses(r"switches\.txt:1: ", read_switches)
+
+    def test_interpretations_are_matrices_by_file(self):
+        path = self.results / "interpret/paper/Hopper-v2/option2vec/seed-000.csv"
+        path.parent.mkdir(parents=True)
+        good = ("dimension,embedding_0,embedding_1,embedding_2,effect_0,effect_1,perturbed_0,"
+                "perturbed_1,delta\n0,1,2,3,4,5,6,7,0.5\n1,8,9,10,11,12,13,14,0.5\n")
+        path.write_text(good)
+        (where, found), = read_interpretations(self.results).items()
+        self.assertEqual((where, found.delta), (path, 0.5))
+        np.testing.assert_array_equal(found.W_o, [[1, 2, 3], [8, 9, 10]])
+        np.testing.assert_array_equal(found.effects, [[4, 5], [11, 12]])
+        np.testing.assert_array_equal(found.perturbed, [[6, 7], [13, 14]])
+        for old, new, message in (
+                ("perturbed_1,delta", "delta", "columns"),  # fewer perturbed than effects
+                ("\n1,8", "\n2,8", "not one row a dimension"),
+                ("14,0.5", "14,0.25", "delta is not the same"),
+                ("0.5\n", "0\n", "delta is not the same positive"),
+                ("12", "nan", "seed-000.csv:3: effect_1: not finite")):
+            path.write_text(good.replace(old, new))
+            with self.subTest(message):
+                self.refuses(message, read_interpretations)
 
 
 if __name__ == "__main__":

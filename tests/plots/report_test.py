@@ -130,13 +130,18 @@ class ReportTest(unittest.TestCase):
             folder = results / "interpret" / "paper" / "Hopper-v2" / "option2vec"
             folder.mkdir(parents=True)
             (folder / "seed-000.csv").write_text(
-                "dimension,embedding_0,embedding_1,effect_0\n0,1,2,0.5\n1,0,-1,-0.25\n")
+                "dimension,embedding_0,embedding_1,effect_0,effect_1,perturbed_0,perturbed_1,delta"
+                "\n0,1,2,0.5,-1,0.25,-0.75,0.5\n1,0,-1,-0.25,0,0.5,-1,0.5\n")
             (results / "bench.json").write_text(str({"benchmarks": [
                 {"name": f"step/Humanoid-v2/{m}/{f}/iterations:5"} | COUNTERS
                 for m in ("option2vec", "ppo", "oc") for f in ("paper", "released")
             ]}).replace("'", '"'))
             embedding, = fig_embedding.draw(results)
             self.assertEqual(embedding.name, "embedding_paper_Hopper-v2_seed-000")
+            # Largest effects 1 (action 1), 0.25 (action 0); changes 0.75 and 1 (action 1) over 0.5.
+            bars = embedding.figure.axes[6]
+            self.assertEqual([b.get_height() for b in bars.patches], [1, 0.25, 1.5, 2])
+            self.assertEqual([t.get_text() for t in bars.texts], ["1", "0", "1", "1"])
             cost, = fig_cost.draw(results)
             self.assertIn("var(--ink)", inline_svg(cost))
             self.assertNotIn("date", svg_of(cost))

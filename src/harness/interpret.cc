@@ -1,0 +1,87 @@
+#include "harness/interpret.h"
+
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+#include "base/check.h"
+#include "base/csv.h"
+#include "harness/evaluate.h"
+
+namespace o2v {
+
+namespace fs = std::filesystem;
+
+Interpretation Interpret(Algorithm& algorithm, const Normalizer& normalizer, Env& env, int episodes,
+                         double delta, std::uint64_t seed) {
+  Param* const embedding = algorithm.Embedding();
+  Check(embedding != nullptr, "interpret: the method's options have no embedding");
+  Check(delta > 0 && std::isfinite(delta), "interpret: delta is ", delta, ", not positive");
+
+  std::vector<Real> visited;  // states, one after the other
+  std::vector<int> o;
+  Evaluate(algorithm, normalizer, env, episodes, /*sample_action=*/true, seed,
+           [&](const Mat& s, int option) {
+             visited.insert(visited.end(), s.data(), s.data() + s.size());
+             o.push_back(option);
+           });
+  const Mat s = Eigen::Map<const Mat>(visited.data(), env.Spec().S, Index(o.size()));
+
+  Mat& W_o = embedding->value;
+  const Mat kept = W_o;
+  MatD J;
+  Mat mu, moved, sigma;
+  algorithm.MeanJacobian(s, o, J);
+  algorithm.ActionPolicy(s, o, mu, sigma);
+  MatD perturbed(W_o.rows(), mu.rows());
+  for (Index d = 0; d < W_o.rows(); ++d) {
+    W_o.row(d).array() += static_cast<Real>(delta);
+    algorithm.ActionPolicy(s, o, moved, sigma);
+    perturbed.row(d) = (moved.cast<double>() - mu.cast<double>()).rowwise().mean().transpose();
+    W_o.row(d) = kept.row(d);
+  }
+  return {kept.cast<double>(), J.transpose(), perturbed, delta, s.cols()};
+}
+
+std::string InterpretationCsv(const Interpretation& x) {
+  const std::pair<const char*, const MatD*> parts[] = {
+      {"embedding_", &x.W_o}, {"effect_", &x.effect}, {"perturbed_", &x.perturbed}};
+  CsvTable table;
+  table.columns = {"dimension"};
+  for (const auto& [name, part] : parts) {
+    for (Index i = 0; i < part->cols(); ++i) table.columns.push_back(Concat(name, i));
+  }
+  table.columns.push_back("delta");
+  for (Index d = 0; d < x.W_o.rows(); ++d) {
+    table.values.push_back(static_cast<double>(d));
+    for (const auto& [name, part] : parts) {
+      for (Index i = 0; i < part->cols(); ++i) table.values.push_back((*part)(d, i));
+    }
+    table.values.push_back(x.delta);
+  }
+  return CsvText(table);
+}
+
+fs::path InterpretationPath(const RunConfig& config, const std::string& task) {
+  std::string variant = ToString(config.fidelity);
+  const Switches plain = SwitchesFor(config.fidelity);
+  for (const SwitchInfo& info : SwitchRegistry()) {
+    const std::string value = SwitchValue(config.switches, info);
+    if (Concerns(info, config) && value != SwitchValue(plain, info)) {
+      variant += Concat("-", info.name, "=", value);
+    }
+  }
+  char file[32];
+  std::snprintf(file, sizeof file, "seed-%03llu.csv", static_cast<unsigned long long>(config.seed));
+  return fs::path("results") / "interpret" / variant / task / config.algorithm / file;
+}
+
+fs::path FindCheckpoint(const fs::path& run) {
+  if (!fs::exists(run)) throw ConfigError(run.string() + ": no such run folder or checkpoint");
+  if (!fs::is_directory(run)) return run;
+  const fs::path path = run / "last.ckpt";
+  if (!fs::exists(path)) throw ConfigError(run.string() + ": no last.ckpt in this folder");
+  return path;
+}
+
+}  // namespace o2v
