@@ -47,10 +47,10 @@ bench: deps  ## costs of layers and environment steps beside the bound; writes r
 	@build/$(PRESET)/bench/o2v_bench --benchmark_out=results/bench.json --benchmark_out_format=json
 
 SUITE    ?= paper
-FIDELITY ?= $(if $(filter ci,$(SUITE)),both,paper)
+FIDELITY ?= $(if $(filter paper single_task transfer ablation,$(SUITE)),paper)
 comma    := ,
 SUITES   := $(if $(filter paper,$(SUITE)),single_task transfer,$(SUITE))
-GRID     := $(SUITES) --fidelity $(if $(filter both,$(FIDELITY)),paper$(comma)released,$(FIDELITY)) \
+GRID     := $(SUITES) $(if $(FIDELITY),--fidelity $(FIDELITY:both=paper$(comma)released)) \
             $(if $(SEEDS),--seeds $(SEEDS)) $(if $(TASKS),--tasks $(TASKS)) $(if $(ALGOS),--algos $(ALGOS))
 reproduce: deps  ## reruns the paper, or SUITE=quick (FIDELITY= SEEDS= TASKS= ALGOS= JOBS=)
 	@$(COMPILE) --target option2vec $(if $(filter paper,$(SUITE)),gradcheck)

@@ -457,7 +457,8 @@ RunConfig ParseRunConfig(const std::string& text, const std::string& file_name) 
   return Build(layer, scope, MethodLayer(scope).hyper, file_name);
 }
 
-std::unique_ptr<Algorithm> MakeRunAlgorithm(const RunConfig& config, const EnvSpec& spec) {
+std::unique_ptr<Algorithm> MakeRunAlgorithm(const RunConfig& config, const EnvSpec& spec,
+                                            bool draw_weights) {
   AlgorithmInput input;
   input.S = spec.S;
   input.A = spec.A;
@@ -466,6 +467,7 @@ std::unique_ptr<Algorithm> MakeRunAlgorithm(const RunConfig& config, const EnvSp
   input.hyper = &config.hyper;
   input.switches = config.switches;
   input.seed = config.seed;
+  input.draw_weights = draw_weights;
   auto algorithm = MakeAlgorithm(config.algorithm, input);
   const auto unused = config.hyper.Unused();
   if (!unused.empty()) {

@@ -61,7 +61,9 @@ std::string ToToml(const RunConfig& config);
 RunConfig ParseRunConfig(const std::string& text, const std::string& file_name);
 
 /// The run's method on a task of these sizes. Throws ConfigError when a number was not read by it.
-std::unique_ptr<Algorithm> MakeRunAlgorithm(const RunConfig& config, const EnvSpec& spec);
+/// `draw_weights` false: its weights stay zero, to be counted.
+std::unique_ptr<Algorithm> MakeRunAlgorithm(const RunConfig& config, const EnvSpec& spec,
+                                            bool draw_weights = true);
 
 /// The lists of an experiment file; runs are their product.
 struct Experiment {

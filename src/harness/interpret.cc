@@ -1,12 +1,12 @@
 #include "harness/interpret.h"
 
 #include <cmath>
-#include <cstdio>
 #include <vector>
 
 #include "base/check.h"
 #include "base/csv.h"
 #include "harness/evaluate.h"
+#include "harness/jobs.h"
 
 namespace o2v {
 
@@ -71,9 +71,8 @@ fs::path InterpretationPath(const RunConfig& config, const std::string& task) {
       variant += Concat("-", info.name, "=", value);
     }
   }
-  char file[32];
-  std::snprintf(file, sizeof file, "seed-%03llu.csv", static_cast<unsigned long long>(config.seed));
-  return fs::path("results") / "interpret" / variant / task / config.algorithm / file;
+  return fs::path("results") / "interpret" / variant / task / config.algorithm /
+         (SeedFolder(config.seed) + ".csv");
 }
 
 fs::path FindCheckpoint(const fs::path& run) {

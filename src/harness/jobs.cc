@@ -27,12 +27,6 @@ std::string Quoted(const std::string& word) {
   return text + "'";
 }
 
-std::string SeedFolder(std::uint64_t seed) {
-  const std::string digits = std::to_string(seed);
-  constexpr std::size_t kDigits = 3;
-  return "seed-" + std::string(kDigits - std::min(kDigits, digits.size()), '0') + digits;
-}
-
 /// Marks a run that is finished, by its record: the folder may be on another machine.
 void MarkFinished(Job& job) {
   const fs::path record = RecordPath(job.dir, ".json");
@@ -48,6 +42,12 @@ void MarkFinished(Job& job) {
 }
 
 }  // namespace
+
+std::string SeedFolder(std::uint64_t seed) {
+  const std::string digits = std::to_string(seed);
+  constexpr std::size_t kDigits = 3;
+  return "seed-" + std::string(kDigits - std::min(kDigits, digits.size()), '0') + digits;
+}
 
 std::vector<Job> ListJobs(const JobQuery& query) {
   std::vector<ConfigText> files;
@@ -105,7 +105,6 @@ std::vector<Job> ListJobs(const JobQuery& query) {
       set = " --set " + Quoted(setting);
     }
     job.dir = query.results / experiments[e].name / variant / task / algorithm / SeedFolder(seed);
-    job.kind = Concat(task, " ", algorithm, " ", fidelity);
     job.command =
         Concat(Quoted(query.program), " train --config ", Quoted(query.configs[e]), " --task ",
                task, " --algo ", algorithm, " --fidelity ", fidelity, set, " --seed ", seed,
@@ -149,9 +148,12 @@ Progress MeasureProgress(const std::vector<Job>& jobs) {
   Progress progress;
   std::map<std::string, Cost> of_kind, of_task;
   Cost of_all;
+  const auto kind_of = [](const Job& job) {
+    return Concat(job.config.task, " ", job.config.algorithm, " ", ToString(job.config.fidelity));
+  };
   std::set<std::string> kinds;
   for (const Job& job : jobs) {
-    kinds.insert(job.kind);
+    kinds.insert(kind_of(job));
     ++progress.runs;
     if (!job.finished) continue;
     ++progress.finished;
@@ -159,7 +161,7 @@ Progress MeasureProgress(const std::vector<Job>& jobs) {
       ++progress.diverged;
       continue;
     }
-    of_kind[job.kind].Add(job);
+    of_kind[kind_of(job)].Add(job);
     of_task[job.config.task].Add(job);
     of_all.Add(job);
   }
@@ -169,7 +171,7 @@ Progress MeasureProgress(const std::vector<Job>& jobs) {
   double left = 0;
   for (const Job& job : jobs) {
     if (job.finished) continue;
-    const auto kind = of_kind.find(job.kind);
+    const auto kind = of_kind.find(kind_of(job));
     const auto task = of_task.find(job.config.task);
     const Cost& cost = kind != of_kind.end()   ? kind->second
                        : task != of_task.end() ? task->second

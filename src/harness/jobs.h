@@ -30,9 +30,11 @@ struct Job {
   std::string command;        // for a shell: starts the run, or goes on with an unfinished one
   std::optional<RunStatus> finished;  // done or diverged: nothing is left to do
   bool old = false;                   // finished by an older revision of the method's code
-  std::string kind;                   // task, method, fidelity: runs of a kind cost alike
   double cpu_seconds = 0;             // that a finished run took
 };
+
+/// The last folder of a run's path: seed-003.
+std::string SeedFolder(std::uint64_t seed);
 
 /// The product of each experiment's lists, seeds outermost over all experiments, so that whatever
 /// has finished is a balanced comparison. All configs are resolved here. Throws ConfigError for a
@@ -45,8 +47,9 @@ struct Progress {
   int kinds = 0, timed = 0;                  // kinds of runs; those with a finished run
   std::optional<double> cpu_seconds_left;    // estimate; nothing when no run has finished
 };
-/// A run that is left is taken to cost what finished runs of its kind did on average, else those of
-/// its task, else all; unfinished ones count as not begun.
+/// Runs of the same task, method and fidelity are of a kind. A run that is left is taken to cost
+/// what finished runs of its kind did on average, else those of its task, else all; unfinished ones
+/// count as not begun.
 Progress MeasureProgress(const std::vector<Job>& jobs);
 /// One line: runs done and left, CPU hours left, hours left with `at_once` runs at a time.
 std::string ToString(const Progress& progress, int at_once);

@@ -41,13 +41,10 @@ std::vector<Task> Tasks() {
 
 /// Counts the method's networks; they are made for it and thrown away.
 ParamRow Count(const Task& task, const RunConfig& config) {
-  AlgorithmInput input;
-  input.S = task.S;
-  input.A = task.A;
-  input.hyper = &config.hyper;
-  input.switches = config.switches;
-  input.draw_weights = false;
-  const auto algorithm = MakeAlgorithm(config.algorithm, input);
+  EnvSpec spec;
+  spec.S = task.S;
+  spec.A = task.A;
+  const auto algorithm = MakeRunAlgorithm(config, spec, /*draw_weights=*/false);
   ParamRow row;
   row.task = task.name;
   row.S = task.S;
