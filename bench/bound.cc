@@ -235,11 +235,33 @@ std::vector<Product> IopgProducts(const RunConfig& config, int S, int A) {
 std::vector<Product> Option2VecProducts(const RunConfig& config, int S, int A) {
   const PpoSizes z(config, S, A);
   const Index D = config.hyper.Int("embedding"), K = config.hyper.Int("options"),
-              F = config.hyper.Int("ffn"), HK = config.hyper.Int("heads") * K;
+              F = config.hyper.Int("ffn"), heads = config.hyper.Int("heads"), HK = heads * K;
   const bool scalar = config.switches.o2v_critic == Fidelity::kPaper;
   const Index tokens = config.switches.o2v_query == Fidelity::kPaper ? 1 : 2;
   std::vector<Product> out;
 
+  // What all samples of a batch share: columns are the K options.
+  const auto memory = [&](Layers l, const std::string& name, bool learn) {
+    const Index d = D / heads;
+    Layers each_head{l.out, l.per_step * double(heads)};
+    l.Forward(name + " keys", D, D, K);
+    l.Forward(name + " values", D, D, K);
+    each_head.Input(name + " score map", D, d, K);  // W_q^T keys
+    each_head.Forward(name + " output map", d, D, K);
+    if (!learn) return;
+    each_head.Weight(name + " score map", D, d, K);
+    each_head.Forward(name + " keys' gradient", D, d, K);
+    each_head.Weight(name + " output map", d, D, K);
+    each_head.Input(name + " output map", d, D, K);
+    for (const char* projection : {" keys", " values"}) {
+      l.Weight(name + projection, D, D, K);
+      l.Input(name + projection, D, D, K);
+    }
+  };
+  const auto table = [&](Layers l, const std::string& name, Index n_out, bool learn) {
+    l.Forward(name + " layer 0 of options", D, n_out, K);
+    if (learn) l.Weight(name + " layer 0 of options", D, n_out, K);
+  };
   const auto options = [&](Layers l, const std::string& name, Index B, bool learn) {
     const Index n = tokens * B;
     l.Forward(name + " query of state", z.S, D, B);
@@ -288,12 +310,18 @@ std::vector<Product> Option2VecProducts(const RunConfig& config, int S, int A) {
   options({out, z.rollout}, "rollout options", z.N, false);
   action({out, z.rollout}, "rollout action", z.N, false);
   critic({out, z.values}, "values critic", z.B, scalar ? K * z.B : z.B, false);
+  memory({out, z.update}, "option stage memory", true);
+  if (tokens == 1) table({out, z.update}, "option stage query", D, true);
   options({out, z.update}, "option stage options", z.B, true);
+  if (scalar) table({out, z.update}, "option stage critic", z.h, true);
   critic({out, z.update}, "option stage critic", z.B, scalar ? K * z.B : z.B, true);
   if (config.switches.o2v_option_in_update == Fidelity::kReleased) {
+    memory({out, z.update}, "action stage memory", false);
     options({out, z.update}, "action stage options", z.B, false);
   }
+  table({out, z.update}, "action stage action", z.h, true);
   action({out, z.update}, "action stage action", z.B, true);
+  if (scalar) table({out, z.update}, "action stage critic", z.h, true);
   critic({out, z.update}, "action stage critic", z.B, z.B, true);
   return out;
 }
