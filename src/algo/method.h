@@ -12,6 +12,7 @@
 #include "algo/algorithm.h"
 #include "algo/option_nets.h"
 #include "algo/surrogate.h"
+#include "base/flush_subnormals.h"
 #include "nn/activation.h"
 #include "nn/adam.h"
 
@@ -92,8 +93,12 @@ class Method : public Algorithm {
 
   /// A step of the optimiser on the gradients of a loss with these terms.
   void StepOn(int stage, const LossTerms& terms) { means_[stage].Add(terms, Step(stage)); }
-  /// Loss and step on a batch.
-  void Learn(int stage, const Batch& batch) { StepOn(stage, Loss(stage, batch, nullptr)); }
+  /// Loss and step on a batch. Where an option is all but never chosen, or a termination saturates,
+  /// gradients are subnormal numbers; weights cannot tell them from zero.
+  void Learn(int stage, const Batch& batch) {
+    const FlushSubnormals flush;
+    StepOn(stage, Loss(stage, batch, nullptr));
+  }
   /// Parameter i, whose gradient must be zero from now on, is never stepped again.
   void Hold(std::size_t i) { adam_->Freeze(i); }
   /// Options o of a step of all workers into `rollout` at `column`, with o_prev_ and the flags;
