@@ -15,6 +15,8 @@ TITLES = {"paper": "ours, paper", "released": "ours, released", "authors": "auth
 NOTE = ("environment steps [millions]\n"
         "return: mean of the last 20 training episodes (smoothing window 20); band: mean $\\pm$ "
         "one standard deviation over the n seeds")
+AUTHORS_NOTE = ("\nbehind our curves the authors' Option2Vec; their other methods are in the panels "
+                "of their logs")
 
 
 def draw_curves(tasks: Sequence[str], methods: Sequence[str], sources: Mapping[str, Samples],
@@ -39,7 +41,7 @@ def draw_curves(tasks: Sequence[str], methods: Sequence[str], sources: Mapping[s
         for panel in panels if limits else []:
             panel.set_ylim(min(limits), max(limits))
         panels[0].set_ylabel("return [reward]")
-    figure.supxlabel(NOTE, fontsize=8)
+    figure.supxlabel(NOTE + (AUTHORS_NOTE if "authors" in sources else ""), fontsize=8)
     legend_above(figure, present, (Line2D([], [], **BEHIND), "authors' Option2Vec"))
     return figure
 

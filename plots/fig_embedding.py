@@ -26,8 +26,7 @@ NOTE = "Option embeddings, the effect of their dimensions on the actions"
 
 def draw(results: Path, experiments: Sequence[str] | None = None) -> list[Drawing]:
     """A figure a file."""
-    del experiments
-    found = read_interpretations(results)
+    found = read_interpretations(results, experiments)
     if not found:
         return [Drawing("embedding", "No figure of the embedding: not measured yet, needs "
                         "`option2vec interpret`.")]
@@ -44,7 +43,7 @@ def _figure(name: str, title: str, found: Interpretation) -> Drawing:
         "width_ratios": [45, 1], "height_ratios": heights})
     for (panel, scale), matrix, label, unit in zip(
             panels, (found.W_o, found.effects, found.perturbed),
-            ("option k", "action a", "action a"),
+            ("option k\n[index]", "action a\n[index]", "action a\n[index]"),
             ("embedding W_o\n[1]", "effect\n[action / embedding]",
              f"change at +{delta}\n[action]")):
         size = np.abs(matrix).max() or 1
@@ -56,7 +55,7 @@ def _figure(name: str, title: str, found: Interpretation) -> Drawing:
     bars, empty = panels[-1]
     empty.set_axis_off()
     _primary_actions(bars, found, delta)
-    bars.set(xlabel="embedding dimension d; above its bars its primary action by effect, by change",
+    bars.set(xlabel="embedding dimension d [index]; above its bars its primary action by effect, by change",
              xlim=(-0.5, D - 0.5), xticks=range(0, D, 5))
     panels[0][0].set_title(title)
     return Drawing(name, f"{NOTE}: derivative, change when a dimension is made {delta} larger, and "

@@ -20,7 +20,7 @@ from plots.statistics import Moments, bootstrap, improvement, iqm, mean_improvem
 from plots.style import FOLDER, RESULTS, Drawing, inline_svg, save
 from plots.tables import COUNTERS, read_bench, read_interpretations, read_rows, read_switches
 from plots.text import (Block, Heading, Items, Paragraph, Picture, Table, interval, moments, number,
-                        p_value, ranges, to_html, to_markdown)
+                        p_clause, p_value, ranges, to_html, to_markdown)
 
 TITLE = "Option2Vec: what the reproduction found"
 SOURCES = FIDELITIES + ("authors",)
@@ -42,7 +42,8 @@ def build(results: Path, experiments: Sequence[str] | None = None
     sources = {f: our_samples(cells, f) for f in FIDELITIES}
     sources["authors"] = author_samples(results / "reference")
     params, gradcheck, theory = (read_rows(results, n) for n in ("params", "gradcheck", "theory"))
-    effects = {path: found.effects for path, found in read_interpretations(results).items()}
+    effects = {path: found.effects
+               for path, found in read_interpretations(results, experiments).items()}
     evidence = [Evidence(f, sources[f], parameter_counts(params, f), gradcheck, theory,
                          {p: e for p, e in effects.items() if p.parts[-4] == f})
                 for f in FIDELITIES]
@@ -58,9 +59,9 @@ def build(results: Path, experiments: Sequence[str] | None = None
     return [
         *_introduction(cells),
         Heading("Claims"), *_claims(evidence),
-        Heading("Single tasks"), Paragraph(SINGLE_NOTE), *_comparison(TASKS, sources),
+        Heading("Single tasks"), Paragraph(SINGLE_NOTE), *_comparison(TASKS, sources, cells),
         *drawn(fig_learning_curves),
-        Heading("Transfer"), Paragraph(TRANSFER_NOTE), *_comparison(tuple(PAIRS), sources),
+        Heading("Transfer"), Paragraph(TRANSFER_NOTE), *_comparison(tuple(PAIRS), sources, cells),
         *drawn(fig_transfer),
         Heading("Options"), *drawn(fig_options), *drawn(fig_embedding),
         Heading("Parameters"), *_parameters(params), *drawn(fig_parameters),
@@ -86,6 +87,12 @@ def _introduction(cells: Mapping[Key, Cell]) -> list[Block]:
     folders = ", ".join(f"`{name}`" for name in sorted({run.path.parts[-5] for run in runs}))
     revisions = [f"{_name(key)}: revision {cell.runs[0].revision} is used, {cell.older} runs of "
                  "older revisions are left out" for key, cell in cells.items() if cell.older]
+    newest: dict[str, int] = {}
+    for key, cell in cells.items():
+        newest[key.algorithm] = max(newest.get(key.algorithm, 0), cell.runs[0].revision)
+    revisions += [f"{_name(key)}: revision {cell.runs[0].revision} is used, there is none of "
+                  f"revision {newest[key.algorithm]}" for key, cell in cells.items()
+                  if cell.runs[0].revision < newest[key.algorithm]]
     blocks: list[Block] = [
         Paragraph(f"Made from the records of {found} of the grid's {grid} runs ({partial}; folders "
                   f"of `results/`: {folders or 'none'}), and from the authors' learning curves in "
@@ -93,12 +100,14 @@ def _introduction(cells: Mapping[Key, Cell]) -> list[Block]:
                   "authors' code computes it; the authors' curves belong beside `released`."),
         Paragraph("A return is the mean of the last 20 training episodes at one million steps, on "
                   "transfer pairs at two. ± is the standard deviation over seeds with divisor n, "
-                  "as in the authors' tables, and n is in parentheses. A run that diverged has no "
+                  "as in the authors' tables, and n is in parentheses (n of Option2Vec and of the "
+                  "method where two are compared). A run that diverged has no "
                   "return; it is counted in the remarks. IQM is the mean of the "
                   "middle half of the seeds. Brackets are 95 % intervals: of differences by "
                   "Welch's t, of IQM and of the probability of improvement by a bootstrap of 2000 "
                   "resamples, stratified by task and method, with a fixed stream. p is Welch's, "
-                  "two-sided, not corrected for the number of tests."),
+                  "two-sided, not corrected for the number of tests. Figures are drawn by "
+                  "`make report` and `make plots`."),
     ]
     if revisions:
         blocks += [Paragraph("**Records of several revisions of a method's code:**"),
@@ -176,12 +185,13 @@ def _finding(finding: Finding) -> str:
 # ---- Returns
 
 
-def _comparison(tasks: Sequence[str], sources: Mapping[str, Samples]) -> list[Block]:
+def _comparison(tasks: Sequence[str], sources: Mapping[str, Samples],
+                cells: Mapping[Key, Cell]) -> list[Block]:
     blocks: list[Block] = []
     for source in SOURCES:
         samples = sources[source]
-        rows = [[task, *(moments(_moments(samples.get((task, m)))) for m in METHODS)]
-                for task in tasks]
+        rows = [[task, *(_entry(samples.get((task, m)), cells.get(Key(source, "", task, m)))
+                         for m in METHODS)] for task in tasks]
         blocks += [Heading(f"Returns, {_source(source)}", 3),
                    Table(["task", *METHODS.values()], rows)]
     blocks += [Heading("Probability of improvement of Option2Vec, mean over tasks", 3),
@@ -203,6 +213,12 @@ def _comparison(tasks: Sequence[str], sources: Mapping[str, Samples]) -> list[Bl
     return blocks
 
 
+def _entry(sample: Sample | None, cell: Cell | None) -> str:
+    lost = cell.diverged if cell else 0
+    text = moments(_moments(sample)) if sample or not lost else ""
+    return ", ".join(filter(None, [text, f"{lost} diverged" if lost else ""]))
+
+
 def _moments(sample: Sample | None) -> Moments | None:
     return None if sample is None else sample.moments
 
@@ -216,9 +232,11 @@ def _row(task: str, method: str, ours: Samples, authors: Samples) -> list[str]:
     beside = ["-"] * 3
     if best is not None and method != OURS and best.step == sample.step:
         d = welch(best.moments, sample.moments)
+        seeds = f"({best.moments.n}, {sample.moments.n})"
         beside = [_with_interval(improvement(best.final, sample.final),
-                                 bootstrap(improvement, best.final, sample.final)),
-                  f"{number(d.mean, '+')} {interval(d.interval, '+')}", p_value(d.p)]
+                                 bootstrap(improvement, best.final, sample.final)) + f" {seeds}",
+                  f"{number(d.mean, '+')} {interval(d.interval, '+')}".removesuffix(" -")
+                  + f" {seeds}", p_value(d.p)]
     remarks = [f"at {sample.step} steps"] if sample.shortened else []
     remarks += [f"{sample.diverged} diverged"] if sample.diverged else []
     remarks += [f"{sample.older} of older revisions left out"] if sample.older else []
@@ -341,11 +359,31 @@ def _deviations(switches: Rows, cells: Mapping[Key, Cell]) -> list[Block]:
                      "; ".join(others) or "-",
                      *(_ran(s["switch"], f, cells) for f in FIDELITIES),
                      "; ".join(_effects(s["switch"], cells)) or "not measured"])
-    return [Paragraph("Every difference between the paper and the released code is a switch. Runs: "
+    return [Paragraph("Every difference between the paper and the released code in what is computed "
+                      "is a switch; differences in sizes are in the second table. Runs: "
                       "the values in the records, with their number. Effect: return with the "
                       "switch turned less that without, other switches as the fidelity has them."),
             Table(["switch", "methods", "the paper", "the released code", "other values",
-                   "our `paper` runs", "our `released` runs", "measured effect"], rows)]
+                   "our `paper` runs", "our `released` runs", "measured effect"], rows),
+            *_sizes(cells)]
+
+
+def _sizes(cells: Mapping[Key, Cell]) -> list[Block]:
+    """Numbers of the methods that differ between the fidelities, as the records have them."""
+    settings = {key: cell.runs[0].settings for key, cell in cells.items() if not key.variant}
+    tasks: dict[tuple[str, ...], list[str]] = {}  # by method, number and its two values
+    for key, ours in settings.items():
+        released = settings.get(key._replace(fidelity="released"), {})
+        for name in sorted(ours.keys() & released.keys()) if key.fidelity == "paper" else ():
+            if not name.startswith("switches.") and name != "run.fidelity" and (
+                    ours[name] != released[name]):
+                line = (METHODS[key.algorithm], name.rpartition(".")[2], str(ours[name]),
+                        str(released[name]))
+                tasks.setdefault(line, []).append(key.task)
+    if not tasks:
+        return [Paragraph("No task has runs of both fidelities whose sizes differ yet.")]
+    return [Table(["method", "number", "our `paper` runs", "our `released` runs", "on"],
+                  [[*line, ", ".join(on)] for line, on in sorted(tasks.items())])]
 
 
 def _ran(switch: str, fidelity: str, cells: Mapping[Key, Cell]) -> str:
@@ -369,7 +407,7 @@ def _effects(switch: str, cells: Mapping[Key, Cell]) -> list[str]:
         if turned is not None and base is not None and turned.step == base.step:
             d = welch(turned.moments, base.moments)
             texts.append(f"{key.fidelity} with {value}, {key.task}, {METHODS[key.algorithm]}: "
-                         f"{number(d.mean, '+')} {interval(d.interval, '+')}, p = {p_value(d.p)} "
+                         f"{number(d.mean, '+')} {interval(d.interval, '+')}, {p_clause(d.p)} "
                          f"(n = {turned.moments.n}, {base.moments.n})")
     return texts
 

@@ -115,8 +115,13 @@ def _durations(runs: tuple[Run, ...]) -> np.ndarray:
         early = mean[known & (run.step <= TENTH * run.wanted)]
         late = mean[known & (run.step > (1 - TENTH) * run.wanted)]
         if len(early) and len(late):
-            pairs.append((early.mean(), late.mean()))
+            pairs.append((_pooled(early), _pooled(late)))
     return np.array(pairs).reshape(-1, 2).T
+
+
+def _pooled(mean: np.ndarray) -> float:
+    """Steps by executions over rows of equally many steps: the harmonic mean of the rows' own."""
+    return len(mean) / (1 / mean).sum()
 
 
 def author_samples(reference: Path) -> Samples:

@@ -2,13 +2,14 @@
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from plots.records import Columns, DamagedFile, Rows, finite, number_or_nan, read_table
+from plots.records import (LEFT_OUT, Columns, DamagedFile, Rows, finite, number_or_nan,
+                           read_table)
 
 COLUMNS: dict[str, Columns] = {
     "params": {  # option2vec params --csv
@@ -84,8 +85,12 @@ class Interpretation:
     delta: float
 
 
-def read_interpretations(results: Path) -> Mapping[Path, Interpretation]:
-    """By file; all dimensions 0, 1, ..., and the same delta in every row."""
+def read_interpretations(results: Path, experiments: Sequence[str] | None = None
+                         ) -> Mapping[Path, Interpretation]:
+    """By file; all dimensions 0, 1, ..., and the same delta in every row. They are of whole runs:
+    none where only experiments that are no evidence are asked for."""
+    if experiments is not None and set(experiments) <= set(LEFT_OUT):
+        return {}
     found = {}
     for path in sorted((results / "interpret").glob("*/*/*/seed-*.csv")):
         with path.open(encoding="utf-8") as file:

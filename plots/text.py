@@ -25,12 +25,20 @@ def interval(i: Interval, sign: str = "") -> str:
 
 
 def moments(m: Moments | None) -> str:
-    """mean +- std (n)."""
-    return "-" if m is None else f"{number(m.mean)} ± {number(m.std)} ({m.n})"
+    """mean +- std (n); of one run there is no deviation."""
+    if m is None:
+        return "-"
+    return f"{number(m.mean)} ± {number(m.std) if m.n > 1 else '-'} ({m.n})"
 
 
 def p_value(p: float) -> str:
     return "-" if math.isnan(p) else "< 0.0001" if p < 1e-4 else f"{p:.2g}"
+
+
+def p_clause(p: float) -> str:
+    """p_value in a sentence."""
+    text = p_value(p)
+    return f"p {text}" if text.startswith("<") else f"p = {text}"
 
 
 def ranges(numbers: Sequence[int]) -> str:

@@ -72,6 +72,11 @@ class AboveTest(unittest.TestCase):
         self.assertIn("would take 17 seeds", parts["Ant-v2"].measured)
 
 
+    def test_one_seed_says_nothing_about_their_number(self):
+        _, parts = judged(self.TEXT, versus(TASKS, [9], {"dac_onestep": [1]}))
+        self.assertNotIn("would take", parts["Ant-v2"].measured)
+
+
 class FirstTest(unittest.TestCase):
     TEXT = "Best on the four"
 
@@ -131,6 +136,13 @@ class AgainstTheBestTest(unittest.TestCase):
                                      (narrow, narrow, UNDECIDED)):
             verdict, _ = judged("Smaller variance", versus(INFINITE, ours, {"ppo": best}))
             self.assertEqual(verdict, expected)
+
+    def test_spread_that_no_test_can_judge_is_undecided(self):
+        # All deviations from the medians 2 and 3 are 1: Brown-Forsythe's F is 0 / 0.
+        evidence = versus(INFINITE, [1, 1, 3, 3], {"ppo": [2, 2, 4, 4]})
+        self.assertEqual(judged("Smaller variance", evidence)[0], UNDECIDED)
+        evidence = versus(INFINITE, [1, 1, 3, 3], {"ppo": [1, 1, 5, 5]})  # F is 1 / 0
+        self.assertEqual(judged("Smaller variance", evidence)[0], HOLDS)
 
     def test_comparable_within_a_fifth_of_the_best_rival(self):
         # The best rival's mean is 100, the margin 20.

@@ -131,6 +131,16 @@ class SamplesTest(InFolder):
         sample = our_samples(load_cells(self.results), "paper")["Cheetah", "ppo"]
         self.assertEqual((list(sample.first), list(sample.final)), ([100], [200]))
 
+    def test_durations_of_a_tenth_are_pooled(self):
+        # Rows of 1 and 100 steps an execution, equally long: 2 / (1 + 1/100) steps by executions.
+        path = write_run(self.results, "Hopper-v2", "option2vec", 0, [1] * 20, options="1,4")
+        lines = path.with_suffix(".csv").read_text().splitlines()
+        for row, duration in ((1, 1), (2, 100)):
+            lines[row] = lines[row].removesuffix("4") + str(duration)
+        path.with_suffix(".csv").write_text("\n".join(lines) + "\n")
+        sample = our_samples(load_cells(self.results), "paper")["Hopper-v2", "option2vec"]
+        np.testing.assert_allclose(sample.durations, [[2 / 1.01], [4]])
+
     def test_durations_are_steps_by_executions(self):
         # Shares 3/4 and 1/4 with durations 3 and 1: a step holds 1/4 + 1/4 executions, so 2 steps
         # each. An option that was not used counts nothing.

@@ -42,7 +42,13 @@ class ReportTest(unittest.TestCase):
         write_run(results, "HalfCheetah-v2", "ppo", 3, [1], status="diverged", steps=10_000,
                   wanted=1_000_000)
         write_run(results, "HalfCheetah-v2", "option2vec", 9, [0] * 100)  # revision 1
-        write_flat(results, "Cheetah", "ppo", [7, 8], fidelity="released", experiment="transfer")
+        for seed in range(2):
+            write_run(results, "HalfCheetah-v2", "oc", seed, [1], status="diverged", steps=10_000,
+                      wanted=1_000_000)
+        write_flat(results, "Hopper-v2", "option2vec", [10])  # revision 1
+        write_flat(results, "Cheetah", "ppo", [7, 8], settings="hidden = 64\nworkers = 1")
+        write_flat(results, "Cheetah", "ppo", [7, 8], settings="hidden = 128\nworkers = 1",
+                   fidelity="released", experiment="transfer")
         write_flat(results, "HalfCheetah-v2", "ppo", [55, 65, 75], experiment="ablation",
                    fidelity="paper-timelimit=released")
         (results / "switches.txt").write_text(
@@ -52,11 +58,13 @@ class ReportTest(unittest.TestCase):
             "name,gap,relation,tolerance,verdict,compared\nTheorem 3.3,1e-12,<,1e-9,PASS,both\n")
         cls.files = make(results)
 
+    def rows(self, *cells: str) -> list[list[str]]:
+        return [line.strip("| ").split(" | ") for line in self.files["REPORT.md"].splitlines()
+                if line.startswith("| " + " | ".join(cells))]
+
     def row(self, *cells: str) -> list[str]:
-        lines = [line for line in self.files["REPORT.md"].splitlines()
-                 if line.startswith("| " + " | ".join(cells))]
-        self.assertEqual(len(lines), 1, cells)
-        return lines[0].strip("| ").split(" | ")
+        row, = self.rows(*cells)
+        return row
 
     def test_means_deviations_and_numbers_of_seeds(self):
         # Option2Vec: mean 110, squares 100 + 0 + 100; the middle half of three is 3/4 of the way
@@ -71,18 +79,33 @@ class ReportTest(unittest.TestCase):
         # Sample variances 100 and 100: t = 50 / sqrt(200/3) with 4 degrees of freedom, p 0.0036;
         # half the interval is 2.776 * 8.165 = 22.67.
         row = self.row("HalfCheetah-v2", "PPO", "60")
-        self.assertEqual(row[6:9], ["1.000 [1.000, 1.000]", "+50.00 [+27.33, +72.67]", "0.0036"])
+        self.assertEqual(row[6:9], ["1.000 [1.000, 1.000] (3, 3)",
+                                    "+50.00 [+27.33, +72.67] (3, 3)", "0.0036"])
         self.assertEqual(row[-1], "1 diverged")
 
+    def test_one_run_has_no_deviation(self):
+        self.assertEqual(self.row("Hopper-v2", "Option2Vec")[2], "10.00 ± - (1)")
+
+    def test_diverged_runs_are_shown_even_where_none_is_whole(self):
+        self.assertIn(" | 2 diverged | 60.00 ± 8.165 (3), 1 diverged |", self.files["REPORT.md"])
+
+    def test_older_revisions_are_named(self):
+        self.assertIn("paper/Hopper-v2/option2vec: revision 1 is used, there is none of revision 2",
+                      self.files["REPORT.md"])
+
+    def test_sizes_that_differ_between_the_fidelities(self):
+        self.assertEqual(self.row("PPO", "hidden"), ["PPO", "hidden", "64", "128", "Cheetah"])
+
     def test_transfer_has_both_ends(self):
-        self.assertEqual(self.row("Cheetah", "PPO", "7")[2], "7.500 ± 0.500 (2)")
-        self.assertEqual(self.row("Cheetah", "PPO", "7")[-2], "7.500 ± 0.500 (2)")
+        paper, released = self.rows("Cheetah", "PPO", "7")
+        self.assertEqual(released[2], "7.500 ± 0.500 (2)")
+        self.assertEqual(released[-2], "7.500 ± 0.500 (2)")
 
     def test_the_ablations_effect_is_in_the_deviations(self):
         row = self.row("timelimit")
         self.assertEqual(row[2:4], ["bootstrap", "terminal"])
         self.assertIn("HalfCheetah-v2, PPO: +5.000 [", row[-1])
-        self.assertEqual(row[-3], "paper (7)")  # three of Option2Vec's newest revision, four of PPO
+        self.assertEqual(row[-3], "paper (12)")  # without the one of an older revision
 
     def test_the_ledger_judges_three_sources(self):
         row = self.row("Q2: Best on the four tasks without termination")
@@ -92,8 +115,8 @@ class ReportTest(unittest.TestCase):
     def test_missing_runs_are_named(self):
         self.assertEqual(self.row("HalfCheetah-v2", "seeds")[1],
                          "seeds 3-9 of Option2Vec; seeds 0-9 of DAC-OneStep, DAC+PPO, AHP+PPO, "
-                         "IOPG, PPOC, OC; seeds 4-9 of PPO")
-        self.assertIn("9 of the grid's 2560 runs", self.files["REPORT.md"])
+                         "IOPG, PPOC; seeds 2-9 of OC; seeds 4-9 of PPO")
+        self.assertIn("14 of the grid's 2560 runs", self.files["REPORT.md"])
 
     def test_the_page_is_whole_by_itself(self):
         page = self.files["report.html"]
@@ -113,7 +136,7 @@ class ReportTest(unittest.TestCase):
         onestep, *_ = fig_learning_curves.draw(self.results)
         titles = [panel.get_title() for panel in onestep.figure.axes]
         self.assertEqual(titles[0], "HalfCheetah-v2\nours, paper: 1 of 2 methods, n = 3")
-        self.assertEqual(sum("no runs yet" in title for title in titles), 19)
+        self.assertEqual(sum("no runs yet" in title for title in titles), 18)
 
     def test_figures_skip_what_is_not_there(self):
         for module in (fig_cost, fig_embedding):

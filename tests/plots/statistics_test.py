@@ -107,6 +107,20 @@ class BootstrapTest(unittest.TestCase):
         self.assertAlmostEqual(low, x.mean() - half, delta=0.15 * half)
         self.assertAlmostEqual(high, x.mean() + half, delta=0.15 * half)
 
+    def test_of_two_values_it_is_enumerated(self):
+        # Resamples of [1, 3] have means 1, 2, 3 with probabilities 1/4, 1/2, 1/4, so that the 2.5
+        # and 97.5 percentiles are the outer two; against [2, 2] these win never, half, always.
+        self.assertEqual(bootstrap(np.mean, np.array([1.0, 3])), (1, 3))
+        self.assertEqual(bootstrap(improvement, np.array([1.0, 3]), np.array([2.0, 2])), (0, 1))
+
+    def test_of_three_values_it_is_enumerated(self):
+        # Of 27 resamples of [0, 3, 9] one has the mean 0 and one 9: 1/27 > 2.5 %, both are in.
+        self.assertEqual(bootstrap(np.mean, np.array([0.0, 3, 9])), (0, 9))
+        # Of [0, 1] in 6 places 1/64 < 2.5 % has none, 7/64 > 2.5 % at most one of the ones.
+        low, high = bootstrap(np.mean, np.array([0.0, 0, 0, 1, 1, 1]))
+        self.assertAlmostEqual(low, 1 / 6)
+        self.assertAlmostEqual(high, 5 / 6)
+
     def test_one_seed_has_no_interval(self):
         self.assertTrue(math.isnan(bootstrap(iqm, np.array([1.0]))[0]))
 
