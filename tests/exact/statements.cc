@@ -322,26 +322,43 @@ double Theorem33WithoutLog(const Instance& instance) {
   return OptionGradient(instance, g);
 }
 
-/// dV_bar(x_0)/dtheta_o(x,j) = E[sum_n gamma^n d ln P(o_n|x_n)/dtheta_o(x,j)
-/// (Q_O(s_n,o_n) - V_bar(x_n))]; d ln P(o|x)/dtheta_o(x,j) = 1[o = j] - P(j|x)
-double SampledOptionGradient(const Instance& instance) {
-  const MatD& P = instance.process.P;
-  const Values v = Solve(instance.process);
-  const int x_0 = StartOf(instance);
-  const MatD g = OptionTerm(instance.process, v);
-  const MatD exact = Visits(v.T).row(x_0).transpose().asDiagonal() * g;
+/// What a policy decided on, and what that was worth.
+struct Decision {
+  int row, drawn;
+  double advantage;
+};
+
+/// Mean of sum_n gamma^n d ln policy(drawn_n|row_n)/dtheta(row,j) advantage_n over ways from one
+/// row, beside what it should be; d ln policy(drawn|row)/dtheta(row,j) = 1[drawn = j] -
+/// policy(j|row). The policy is P or pi_a; decision(x_n, o_n, a_n) is what it decided.
+template <typename F>
+double SampledGradient(const Instance& instance, const MatD& policy, const MatD& exact,
+                       F decision) {
   Rng rng(instance.seed, "gradients");
-  Sample sample(kRows * K);
-  MatD estimate(kRows, K);
+  Sample sample(exact.size());
+  MatD estimate(exact.rows(), exact.cols());
   for (int i = 0; i < kReturns; ++i) {
     estimate.setZero();
-    Rollout(instance.process, x_0, rng, [&](double discount, int x, int o, int) {
-      const double advantage = v.Q_O(Row(StateOf(x), o)) - v.V_bar(x);
-      for (int j = 0; j < K; ++j) estimate(x, j) += discount * ((o == j) - P(x, j)) * advantage;
+    Rollout(instance.process, StartOf(instance), rng, [&](double discount, int x, int o, int a) {
+      const auto [row, drawn, advantage] = decision(x, o, a);
+      for (int j = 0; j < policy.cols(); ++j) {
+        estimate(row, j) += discount * ((drawn == j) - policy(row, j)) * advantage;
+      }
     });
     sample.Add(estimate.reshaped());
   }
   return sample.Error(exact.reshaped());
+}
+
+/// dV_bar(x_0)/dtheta_o(x,j) = E[sum_n gamma^n d ln P(o_n|x_n)/dtheta_o(x,j)
+/// (Q_O(s_n,o_n) - V_bar(x_n))]
+double SampledOptionGradient(const Instance& instance) {
+  const Values v = Solve(instance.process);
+  const VecD visits = Visits(v.T).row(StartOf(instance));
+  const MatD exact = visits.asDiagonal() * OptionTerm(instance.process, v);
+  return SampledGradient(instance, instance.process.P, exact, [&](int x, int o, int) {
+    return Decision{x, o, v.Q_O(Row(StateOf(x), o)) - v.V_bar(x)};
+  });
 }
 
 /// dQ_O(y_0)/dtheta_a(y,j) = sum_{n >= 0} gamma^n Pr(y_n = y|y_0) h(y,j)
@@ -363,6 +380,29 @@ double Theorem34(const Instance& instance) {
   return gap;
 }
 
+/// Pr(y_0 = (s,o)) = sum_{o'} d_0(s,o') P(o|s,o')
+VecD LawAfterOption(const Process& process, const VecD& d_0) {
+  VecD e_0 = VecD::Zero(kRows);
+  for (int x = 0; x < kRows; ++x) {
+    for (int o = 0; o < K; ++o) e_0(Row(StateOf(x), o)) += d_0(x) * process.P(x, o);
+  }
+  return e_0;
+}
+
+/// dV_bar(x_0)/dtheta_a(y,j) = sum_o P(o|x_0) dQ_O(s_0,o)/dtheta_a(y,j)
+/// = E[sum_n gamma^n d ln pi_a(a_n|y_n)/dtheta_a(y,j) (Q_A(s_n,o_n,a_n) - Q_O(s_n,o_n))]
+double SampledActionGradient(const Instance& instance) {
+  const Process& process = instance.process;
+  const Values v = Solve(process);
+  const VecD e_0 = LawAfterOption(process, VecD::Unit(kRows, StartOf(instance)));
+  const VecD visits = Visits(ActionChain(process)).transpose() * e_0;
+  const MatD exact = visits.asDiagonal() * ActionTerm(process, v);
+  return SampledGradient(instance, process.pi_a, exact, [&](int x, int o, int a) {
+    const int y = Row(StateOf(x), o);
+    return Decision{y, a, v.Q_A(y, a) - v.Q_O(y)};
+  });
+}
+
 /// Both policies read one table W := theta_o: d(d_0 V_bar)/dW(row,j) is
 ///   sum_n gamma^n Pr(x_n = row) g(row,j) + sum_n gamma^n Pr(y_n = row) h(row,j).
 /// Without the second term W learns from the option policy only, as an embedding does that the
@@ -376,10 +416,7 @@ double SharedTable(const Instance& instance, bool second_term) {
     return Solve(process);
   };
   const Values v = solve();
-  VecD e_0 = VecD::Zero(kRows);  // Pr(y_0 = (s,o)) = sum_{o'} d_0(s,o') P(o|s,o')
-  for (int x = 0; x < kRows; ++x) {
-    for (int o = 0; o < K; ++o) e_0(Row(StateOf(x), o)) += instance.d_0(x) * process.P(x, o);
-  }
+  const VecD e_0 = LawAfterOption(process, instance.d_0);
   const VecD x_visits = Visits(v.T).transpose() * instance.d_0;
   const VecD y_visits = Visits(ActionChain(process)).transpose() * e_0;
   MatD total = x_visits.asDiagonal() * OptionTerm(process, v);
@@ -610,9 +647,13 @@ std::vector<Statement> AllStatements() {
       {"Theorem 3.3 sampled",
        "that gradient and the mean of 200000 sum_n gamma^n d ln P (Q_O - V_bar) [standard errors]",
        kBelow, kSigmas, SampledOptionGradient},
-      // Check 9.
+      // Check 9, and check 11 of the action policy.
       {"Theorem 3.4 (action policy gradient)", "(I - gamma U)^-1 h and central differences of Q_O",
        kBelow, kDifference, Theorem34},
+      {"Theorem 3.4 sampled",
+       "that gradient after o_0 ~ P and the mean of 200000 sum_n gamma^n d ln pi_a (Q_A - Q_O) "
+       "[standard errors]",
+       kBelow, kSigmas, SampledActionGradient},
       // Check 10.
       {"Theorems 3.3 and 3.4 with shared parameters",
        "both terms and central differences of d_0 V_bar", kBelow, kDifference,
