@@ -128,9 +128,9 @@ Iopg::Iopg(const AlgorithmInput& in)
 }
 
 // The unfinished episodes of the old task are forgotten, or, where the new task's first step is not
-// marked, joined with the new task's steps; spec 4.5 (g). An iteration ends with an episode, so that
-// tasks change after one, not at the very next step as in the authors' code: where all workers'
-// episodes are equally long, none is unfinished.
+// marked, joined with the new task's steps; spec 4.5 (g). An iteration ends with an episode, so
+// that tasks change after one, not at the very next step as in the authors' code: where all
+// workers' episodes are equally long, none is unfinished.
 void Iopg::ChangeTask() {
   if (switches_.switch_init_flag == Fidelity::kReleased) return;
   for (Worker& worker : workers_) worker.length = 0;

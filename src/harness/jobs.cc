@@ -31,6 +31,11 @@ std::string Quoted(const std::string& word) {
 void MarkFinished(Job& job) {
   const fs::path record = RecordPath(job.dir, ".json");
   if (!fs::exists(record)) return;
+  if (const fs::path csv = RecordPath(job.dir, ".csv"); !fs::exists(csv)) {
+    throw ConfigError(Concat(csv.string(), ": missing; a record is a pair of files, this and ",
+                             record.filename().string(), ": write both with `option2vec record ",
+                             job.dir.string(), "`, or move the other away to run it again"));
+  }
   const Record run = ReadRecord(record);
   if (run.config != ToToml(job.config)) {
     throw ConfigError(Concat(record.string(), ": this run was finished with another ",
@@ -157,6 +162,7 @@ Progress MeasureProgress(const std::vector<Job>& jobs) {
     ++progress.runs;
     if (!job.finished) continue;
     ++progress.finished;
+    progress.old += job.old;
     if (*job.finished == RunStatus::kDiverged) {  // broke off: its cost says nothing
       ++progress.diverged;
       continue;
@@ -185,6 +191,7 @@ Progress MeasureProgress(const std::vector<Job>& jobs) {
 std::string ToString(const Progress& progress, int at_once) {
   std::string text = Concat(progress.runs, " runs: ", progress.finished, " done");
   if (progress.diverged > 0) text += Concat(" (", progress.diverged, " diverged)");
+  if (progress.old > 0) text += Concat(" (", progress.old, " by older revisions of their methods)");
   const int left = progress.runs - progress.finished;
   text += Concat(", ", left, " left");
   if (left == 0) return text;

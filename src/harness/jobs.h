@@ -38,14 +38,15 @@ std::string SeedFolder(std::uint64_t seed);
 
 /// The product of each experiment's lists, seeds outermost over all experiments, so that whatever
 /// has finished is a balanced comparison. All configs are resolved here. Throws ConfigError for a
-/// bad config, and for a run that was finished with another one.
+/// bad config, for a run that was finished with another one, and for half a record.
 std::vector<Job> ListJobs(const JobQuery& query);
 
 /// How far a grid of runs has come.
 struct Progress {
-  int runs = 0, finished = 0, diverged = 0;  // diverged ones are finished, too
-  int kinds = 0, timed = 0;                  // kinds of runs; those with a finished run
-  std::optional<double> cpu_seconds_left;    // estimate; nothing when no run has finished
+  int runs = 0, finished = 0;
+  int diverged = 0, old = 0;               // of the finished ones; see Job
+  int kinds = 0, timed = 0;                // kinds of runs; those with a finished run
+  std::optional<double> cpu_seconds_left;  // estimate; nothing when no run has finished
 };
 /// Runs of the same task, method and fidelity are of a kind. A run that is left is taken to cost
 /// what finished runs of its kind did on average, else those of its task, else all; unfinished ones

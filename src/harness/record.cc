@@ -1,6 +1,7 @@
 #include "harness/record.h"
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "base/check.h"
@@ -14,6 +15,43 @@ using nlohmann::ordered_json;
 
 constexpr std::int64_t kGrid = 10'000;  // [environment steps] ours: 100 rows a million steps
 
+/// Columns of an option in an updates.csv.
+struct OptionColumns {
+  std::size_t usage, duration;
+};
+
+std::vector<OptionColumns> FindOptions(const CsvTable& updates) {
+  std::vector<OptionColumns> options;
+  for (std::size_t c = 0; c < updates.columns.size(); ++c) {
+    if (!updates.columns[c].starts_with("usage_")) continue;
+    const std::string k = std::to_string(options.size());
+    options.push_back({updates.Column("usage_" + k), updates.Column("duration_" + k + "_steps")});
+  }
+  return options;
+}
+
+/// What the rows [from, to) of an updates.csv say of an option.
+struct OptionCount {
+  double all = 0, steps = 0, executions = 0;  // steps with any option, with this one
+};
+
+/// A row holds its n steps with the option as their share, and n by the b executions that began
+/// as duration, or n itself where b is 0. Rounding gives back the whole numbers, except that b = 0
+/// looks like b = 1 and counts as one: what a row says alone it says among others, too.
+OptionCount CountOption(const CsvTable& updates, const OptionColumns& option, std::size_t from,
+                        std::size_t to) {
+  OptionCount count;
+  for (std::size_t row = from; row < to; ++row) {
+    const double all = updates.At(row, 0) - (row > 0 ? updates.At(row - 1, 0) : 0);
+    const double steps = std::round(updates.At(row, option.usage) * all);
+    const double duration = updates.At(row, option.duration);
+    count.all += all;
+    count.steps += steps;
+    if (duration > 0) count.executions += std::round(steps / duration);
+  }
+  return count;
+}
+
 }  // namespace
 
 std::filesystem::path RecordPath(std::filesystem::path dir, const char* ending) {
@@ -23,14 +61,10 @@ std::filesystem::path RecordPath(std::filesystem::path dir, const char* ending) 
 std::string RecordCsv(std::span<const CurvePoint> episodes, const CsvTable& updates,
                       std::int64_t steps) {
   const std::vector<CurvePoint> curve = SmoothedReturns(episodes);
-  std::vector<std::size_t> options;  // columns
+  const std::vector<OptionColumns> options = FindOptions(updates);
   std::string text = "step,return_20";
-  for (std::size_t c = 0; c < updates.columns.size(); ++c) {
-    const std::string& name = updates.columns[c];
-    if (!name.starts_with("usage_") && !name.starts_with("duration_")) continue;
-    options.push_back(c);
-    text += "," + name;
-  }
+  for (const OptionColumns& option : options) text += "," + updates.columns[option.usage];
+  for (const OptionColumns& option : options) text += "," + updates.columns[option.duration];
   text += "\n";
   std::size_t known = 0;  // points of the curve at or before the grid step
   std::size_t first = 0;  // update since the grid step before
@@ -43,12 +77,14 @@ std::string RecordCsv(std::span<const CurvePoint> episodes, const CsvTable& upda
       text += Decimal(step) + "," + Decimal(curve[known - 1].second);
       const std::size_t last = std::min(std::max(end, first + 1), updates.Rows());
       const std::size_t from = std::min(first, last - 1);
-      for (const std::size_t c : options) {
-        double sum = 0;
-        for (std::size_t row = from; row < last; ++row) sum += updates.At(row, c);
-        text += "," + Decimal(sum / static_cast<double>(last - from));
+      std::string durations;
+      for (const OptionColumns& option : options) {
+        const OptionCount count = CountOption(updates, option, from, last);
+        text += "," + Decimal(count.steps / count.all);
+        durations += ",";
+        if (count.executions > 0) durations += Decimal(count.steps / count.executions);
       }
-      text += "\n";
+      text += durations + "\n";
     }
     first = end;
   }

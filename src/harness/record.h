@@ -19,8 +19,9 @@ std::filesystem::path RecordPath(std::filesystem::path dir, const char* ending);
 /// The record of a finished run, as CSV on a grid of 10 000 steps up to `steps` (and `steps`
 /// itself). `return_20`: the last smoothed return at or before the grid step, not interpolated; no
 /// row before the first. The row of step 1 000 000 is therefore exactly return_at_1M. `usage_k` and
-/// `duration_k_steps`, for methods with options: mean over the updates since the grid step before;
-/// of the next update when there was none.
+/// `duration_k_steps`, for methods with options: of the updates since the grid step before put
+/// together, steps with the option by steps and by executions; of the next update when there was
+/// none. The duration of an option that was not used is an empty cell.
 std::string RecordCsv(std::span<const CurvePoint> episodes, const CsvTable& updates,
                       std::int64_t steps);
 

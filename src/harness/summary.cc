@@ -11,7 +11,6 @@
 
 #include "base/align.h"
 #include "base/check.h"
-#include "base/csv.h"
 #include "base/files.h"
 #include "embedded/reference.h"
 #include "env/pairs.h"
@@ -58,8 +57,34 @@ struct RunRecord {
   Record meta;
   std::int64_t wanted_steps;      // of its config
   std::int64_t tasks;             // that they are spent on, one after the other
-  std::vector<CurvePoint> curve;  // smoothed returns, by step
+  std::vector<CurvePoint> curve;  // smoothed returns, by step; empty: fewer than 20 episodes
 };
+
+/// Step and return of each row of a RecordCsv. Of the options, where cells may be empty, only the
+/// number of cells is looked at.
+std::vector<CurvePoint> ReadCurve(const fs::path& csv) {
+  std::istringstream in(ReadFile(csv));
+  std::string line;
+  std::getline(in, line);
+  Check((line + ",").starts_with("step,return_20,"), csv.string(),
+        ":1: not the columns of a record");
+  const auto commas = std::ranges::count(line, ',');
+  std::vector<CurvePoint> curve;
+  while (std::getline(in, line)) {
+    const char* const end = line.data() + line.size();
+    CurvePoint point;
+    const auto [comma, bad_step] = std::from_chars(line.data(), end, point.first);
+    bool good = bad_step == std::errc() && comma != end && *comma == ',';
+    if (good) {
+      const auto [stop, bad_return] = std::from_chars(comma + 1, end, point.second);
+      good = bad_return == std::errc() && (stop == end || *stop == ',') &&
+             std::isfinite(point.second) && std::ranges::count(line, ',') == commas;
+    }
+    Check(good, csv.string(), ":", curve.size() + 2, ": not the row of a record");
+    curve.push_back(point);
+  }
+  return curve;
+}
 
 RunRecord ReadRun(const fs::path& json) {
   RunRecord run;
@@ -67,14 +92,7 @@ RunRecord ReadRun(const fs::path& json) {
   const RunConfig config = ParseRunConfig(run.meta.config, json.string());
   run.wanted_steps = config.steps;
   run.tasks = static_cast<std::int64_t>(SplitTasks(config.task).size());
-  const fs::path csv = fs::path(json).replace_extension(".csv");
-  const std::string text = ReadFile(csv);
-  if (std::count(text.begin(), text.end(), '\n') == 1) return run;  // fewer than 20 episodes
-  const CsvTable table = ReadCsv(csv);
-  const std::size_t step = table.Column("step"), ret = table.Column("return_20");
-  for (std::size_t i = 0; i < table.Rows(); ++i) {
-    run.curve.emplace_back(std::llround(table.At(i, step)), table.At(i, ret));
-  }
+  run.curve = ReadCurve(fs::path(json).replace_extension(".csv"));
   return run;
 }
 
@@ -169,10 +187,15 @@ std::vector<SummaryRow> Summarize(const fs::path& experiment) {
   if (groups.empty()) throw ConfigError(experiment.string() + ": no record of a finished run");
   std::vector<SummaryRow> rows;
   for (const auto& [key, by_file] : groups) {
+    int newest = 0;
+    for (const auto& [file, run] : by_file) newest = std::max(newest, run.meta.revision);
     std::vector<RunRecord> runs;
-    for (const auto& [file, run] : by_file) runs.push_back(run);
+    for (const auto& [file, run] : by_file) {
+      if (run.meta.revision == newest) runs.push_back(run);
+    }
     for (std::int64_t task = 1; task <= runs[0].tasks; ++task) {
       rows.push_back(MakeRow(key, runs, task));
+      rows.back().n_older = static_cast<int>(by_file.size() - runs.size());
     }
   }
   return rows;
@@ -194,7 +217,7 @@ std::string SummaryCsv(const std::vector<SummaryRow>& rows) {
 std::string SummaryTable(const std::vector<SummaryRow>& rows) {
   std::vector<std::vector<std::string>> table = {{"fidelity", "task", "method", "step", "n",
                                                   "mean +- std", "stderr", "IQM", "95 % interval",
-                                                  "authors (n)", "no value"}};
+                                                  "authors (n)", "left out"}};
   for (const SummaryRow& row : rows) {
     std::vector<std::string> line = {row.fidelity, row.task, row.algorithm,
                                      std::to_string(row.step), std::to_string(row.values.size())};
@@ -211,9 +234,10 @@ std::string SummaryTable(const std::vector<SummaryRow>& rows) {
     line.push_back(
         authors ? Concat(Four(authors->mean), " +- ", Four(authors->std), " (", authors->n, ")")
                 : "-");
-    line.push_back(row.n_diverged + row.n_short == 0
+    line.push_back(row.n_diverged + row.n_short + row.n_older == 0
                        ? ""
-                       : Concat(row.n_diverged, " diverged, ", row.n_short, " short"));
+                       : Concat(row.n_diverged, " diverged, ", row.n_short, " short, ", row.n_older,
+                                " older"));
     table.push_back(std::move(line));
   }
 
@@ -222,7 +246,9 @@ std::string SummaryTable(const std::vector<SummaryRow>& rows) {
          "n\n"
          "seeds. Authors: their curves at that step, from 1000000 on their return_at_1M; they are "
          "of\n"
-         "the released code. Short: fewer than 20 episodes.\n";
+         "the released code. Left out: runs that diverged before the step, that are too short "
+         "(fewer\n"
+         "than 20 episodes), that an older revision of the method's code made.\n";
 }
 
 }  // namespace o2v

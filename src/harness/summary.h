@@ -32,19 +32,20 @@ struct SummaryRow {
   std::vector<double> values;  // smoothed return of every run that came to `step` and has one
   int n_diverged = 0;          // runs that broke off before it
   int n_short = 0;             // runs that came to it with fewer than 20 episodes, hence no value
+  int n_older = 0;             // runs by older revisions of the method's code, left out
 };
 
 /// Reads the records seed-*.csv and seed-*.json below `experiment` (results/quick). `step` of a row
-/// is the end of a task: the least of the runs' own steps there, at most 1 000 000 a task. Rows
-/// sorted by fidelity, task and method. Throws ConfigError when there is no record at all, Error
-/// for a damaged one.
+/// is the end of a task: the least of the runs' own steps there, at most 1 000 000 a task. Of each
+/// row only the runs of the newest revision among them count. Rows sorted by fidelity, task and
+/// method. Throws ConfigError when there is no record at all, Error for a damaged one.
 std::vector<SummaryRow> Summarize(const std::filesystem::path& experiment);
 
 /// fidelity, task, algorithm, step, n_seeds, mean, std, stderr, iqm, ci_low, ci_high as CSV: std
 /// with divisor n, 95 % bootstrap interval of the mean. A row without values is left out.
 std::string SummaryCsv(const std::vector<SummaryRow>& rows);
 
-/// The same for the eye, with the authors' numbers and with the runs that have no value.
+/// The same for the eye, with the authors' numbers and with the runs that are left out.
 std::string SummaryTable(const std::vector<SummaryRow>& rows);
 
 }  // namespace o2v

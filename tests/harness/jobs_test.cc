@@ -36,6 +36,7 @@ class Jobs : public testing::Test {
     if (status != RunStatus::kDone && status != RunStatus::kDiverged) return;
     manifest.revision = revision;
     manifest.cpu_seconds = cpu_seconds;
+    WriteFileAtomically(RecordPath(job.dir, ".csv"), "step,return_20\n");
     WriteFileAtomically(RecordPath(job.dir, ".json"),
                         RecordJson(ManifestJson(manifest), ToToml(job.config)));
   }
@@ -189,6 +190,31 @@ TEST_F(Jobs, ARecordOfAnOlderRevisionIsMarked) {
   const Job job = ListJobs(Query())[0];
   Leave(job, RunStatus::kDone, FindAlgorithm(job.config.algorithm).revision - 1);
   EXPECT_TRUE(ListJobs(Query())[0].old);
+  Leave(ListJobs(Query())[2], RunStatus::kDone);
+  const Progress progress = MeasureProgress(ListJobs(Query()));
+  EXPECT_EQ(progress.finished, 2);
+  EXPECT_EQ(progress.old, 1);
+  EXPECT_TRUE(ToString(progress, 1)
+                  .starts_with("8 runs: 2 done (1 by older revisions of their methods), 6 left"))
+      << ToString(progress, 1);
+}
+
+TEST_F(Jobs, HalfARecordIsRefusedByName) {
+  const Job job = ListJobs(Query())[0];
+  Leave(job, RunStatus::kDone);
+  const fs::path csv = RecordPath(job.dir, ".csv");
+  fs::remove(csv);
+  try {
+    ListJobs(Query());
+    ADD_FAILURE() << "half a record was taken for a finished run";
+  } catch (const ConfigError& e) {
+    EXPECT_TRUE(std::string(e.what()).starts_with(csv.string() + ": missing; a record is a pair"))
+        << e.what();
+  }
+  // Of a run that was killed while it wrote its record, the .csv alone is there: it goes on.
+  WriteFileAtomically(csv, "step,return_20\n");
+  fs::remove(RecordPath(job.dir, ".json"));
+  EXPECT_FALSE(ListJobs(Query())[0].finished);
 }
 
 TEST_F(Jobs, PairsAreTasks) {

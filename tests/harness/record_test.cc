@@ -4,6 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/check.h"
+#include "base/decimal.h"
 #include "fake_run.h"
 
 namespace o2v {
@@ -20,13 +22,36 @@ TEST(RecordCsv, HoldsTheLastSmoothedValueAtOrBeforeTheGridStep) {
 }
 
 TEST(RecordCsv, HoldsTheOptionsOfTheUpdatesSinceTheGridStepBefore) {
-  // Two updates up to 10 000, none up to 20 000 (the next one stands for it), one up to 30 000.
-  const CsvTable updates{"updates.csv",
-                         {"step", "loss", "usage_0", "duration_0_steps"},
-                         {4'000, 9, 0.25, 1, 8'000, 9, 0.75, 2, 24'000, 9, 0.5, 6}};
+  // Up to 10 000 two updates. Option 0: 2000 steps in 200 executions, 4500 in 300: 6500 of 8000
+  // steps, 6500 / 500 = 13. Option 1: not used, 1500 steps in 750 executions: 1500 / 8000, 2 steps.
+  // Up to 20 000 none, the next one stands for it: option 0 is not used, option 1 all the time.
+  // Up to 30 000 this and another. Option 0: 2000 of 20 000 steps in 500 executions. Option 1:
+  // 16 000 steps of one execution, or of one begun before, and 2000 of one: 18 000 / 2.
+  const CsvTable updates{
+      "updates.csv",
+      {"step", "loss", "usage_0", "usage_1", "duration_0_steps", "duration_1_steps"},
+      {2'000,  9, 1,    0,    10, 0,       //
+       8'000,  9, 0.75, 0.25, 15, 2,       //
+       24'000, 9, 0,    1,    0,  16'000,  //
+       28'000, 9, 0.5,  0.5,  4,  2'000}};
   EXPECT_EQ(RecordCsv(Rising(300), updates, 30'000),
-            "step,return_20,usage_0,duration_0_steps\n10000,90.5,0.5,1.5\n20000,190.5,0.5,6\n"
-            "30000,290.5,0.5,6\n");
+            "step,return_20,usage_0,usage_1,duration_0_steps,duration_1_steps\n"
+            "10000,90.5,0.8125,0.1875,13,2\n"
+            "20000,190.5,0,1,,16000\n"
+            "30000,290.5,0.1,0.9,4,9000\n");
+}
+
+TEST(RecordCsv, AddsUpStepsAndExecutionsAsWholeNumbers) {
+  // 1 of 3000 steps in 1 execution, 27 of 3000 in 13: 28 of 6000 in 14. The products and quotients
+  // of these shares and durations are not all whole. After it an update alone: its own numbers.
+  const CsvTable updates{"updates.csv",
+                         {"step", "usage_0", "duration_0_steps"},
+                         {3'000, 1.0 / 3000, 1,           //
+                          6'000, 27.0 / 3000, 27.0 / 13,  //
+                          14'192, 3000.0 / 8192, 3000.0 / 7}};
+  EXPECT_EQ(RecordCsv(Rising(200), updates, 20'000),
+            Concat("step,return_20,usage_0,duration_0_steps\n10000,90.5,", Decimal(28.0 / 6000),
+                   ",2\n20000,190.5,", Decimal(3000.0 / 8192), ",", Decimal(3000.0 / 7), "\n"));
 }
 
 TEST(RecordCsv, HasNoRowBeforeTheFirstValue) {

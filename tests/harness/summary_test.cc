@@ -24,7 +24,7 @@ class Summary : public testing::Test {
   /// A record as a finished run leaves it; `curve` are rows "step,return".
   void Record(const std::string& task, int seed, std::int64_t wanted_steps,
               const std::string& curve, RunStatus status = RunStatus::kDone,
-              std::int64_t steps = 2000000) const {
+              std::int64_t steps = 2000000, int revision = 1) const {
     RunRequest request;
     request.task = task;
     request.algorithm = "ppo";
@@ -33,6 +33,7 @@ class Summary : public testing::Test {
     Manifest manifest;
     manifest.status = status;
     manifest.steps = steps;
+    manifest.revision = revision;
     const fs::path dir = root_ / "paper" / task / "ppo";
     const std::string name = "seed-00" + std::to_string(seed);
     fs::create_directories(dir);
@@ -83,7 +84,40 @@ TEST_F(Summary, CountsDivergedAndShortRunsApart) {
   EXPECT_EQ(rows[0].values, (std::vector<double>{4}));
   EXPECT_EQ(rows[0].n_diverged, 1);
   EXPECT_EQ(rows[0].n_short, 1);
-  EXPECT_NE(SummaryTable(rows).find("1 diverged, 1 short"), std::string::npos);
+  EXPECT_NE(SummaryTable(rows).find("1 diverged, 1 short, 0 older"), std::string::npos);
+}
+
+TEST_F(Summary, LeavesOutRunsOfOlderRevisionsAndSaysSo) {
+  // Revisions 1, 2, 1, 2: of the older two neither the returns nor the fewer steps count.
+  Record("Hopper-v2", 0, 20000, "20000,100\n");
+  Record("Hopper-v2", 1, 30000, "30000,4\n", RunStatus::kDone, 30000, 2);
+  Record("Hopper-v2", 2, 30000, "10000,7\n", RunStatus::kDiverged, 12000);
+  Record("Hopper-v2", 3, 30000, "30000,6\n", RunStatus::kDone, 30000, 2);
+  Record("Ant-v2", 0, 30000, "30000,1\n");  // newest there is
+  const auto rows = Summarize(root_);
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].values, (std::vector<double>{1}));
+  EXPECT_EQ(rows[0].n_older, 0);
+  EXPECT_EQ(rows[1].step, 30000);
+  EXPECT_EQ(rows[1].values, (std::vector<double>{4, 6}));
+  EXPECT_EQ(rows[1].n_diverged, 0);
+  EXPECT_EQ(rows[1].n_older, 2);
+  EXPECT_NE(SummaryTable(rows).find("0 diverged, 0 short, 2 older"), std::string::npos);
+}
+
+TEST_F(Summary, ReadsRecordsWithEmptyCellsOfOptions) {
+  Record("Hopper-v2", 0, 30000, "");
+  const fs::path csv = root_ / "paper/Hopper-v2/ppo/seed-000.csv";
+  const std::string header = "step,return_20,usage_0,duration_0_steps\n";
+  WriteFileAtomically(csv, header + "10000,-1e-05,0,\n20000,2.5,1,12\n30000,3.5,0,\n");
+  EXPECT_EQ(Summarize(root_)[0].values, (std::vector<double>{3.5}));
+  for (const char* row : {"10000", "10000,", "10000,1", "10000,1,0", "10000,x,0,", "1e4,1,0,",
+                          "10000,1 ,0,", "10000,nan,0,", "10000,inf,0,", "10000,1,0,,"}) {
+    WriteFileAtomically(csv, header + row + "\n");
+    EXPECT_THROW(Summarize(root_), Error) << row;
+  }
+  WriteFileAtomically(csv, "step,return_200\n10000,1\n");
+  EXPECT_THROW(Summarize(root_), Error);
 }
 
 TEST_F(Summary, CsvHoldsTheStatisticsOfHandMadeRuns) {
