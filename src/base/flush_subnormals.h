@@ -8,7 +8,7 @@
 namespace o2v {
 
 /// While it lives, results of this thread below the smallest normal number (1e-38 as float) become
-/// zero, and such operands are taken for zero. They are a hundred times slower than others. x86
+/// zero, and such operands are taken for zero: processors compute with them many times slower. x86
 /// only; elsewhere nothing changes.
 class FlushSubnormals {
  public:

@@ -1,4 +1,4 @@
-// An update does without subnormal numbers, which are a hundred times slower; acting, and with it
+// An update does without subnormal numbers, which are many times slower; acting, and with it
 // the physics, does not.
 
 #include <gtest/gtest.h>
