@@ -238,6 +238,7 @@ std::vector<Product> Option2VecProducts(const RunConfig& config, int S, int A) {
               F = config.hyper.Int("ffn"), heads = config.hyper.Int("heads"), HK = heads * K;
   const bool scalar = config.switches.o2v_critic == Fidelity::kPaper;
   const Index tokens = config.switches.o2v_query == Fidelity::kPaper ? 1 : 2;
+  const bool prev_grad = config.switches.o2v_prev_embed_grad == Fidelity::kPaper;
   std::vector<Product> out;
 
   // What all samples of a batch share: columns are the K options.
@@ -273,7 +274,7 @@ std::vector<Product> Option2VecProducts(const RunConfig& config, int S, int A) {
     if (!learn) return;
     l.Weight(name + " query of state", z.S, D, B);
     l.Weight(name + " attention scores", D, HK, n);
-    l.Input(name + " attention scores", D, HK, n);
+    l.Input(name + " attention scores", D, HK, prev_grad ? n : B);
     l.Weight(name + " attention output", HK, D, n);
     l.Input(name + " attention output", HK, D, n);
     l.Weight(name + " ffn 0", D, F, n);

@@ -149,7 +149,7 @@ void OptionPolicyNet::Backward(const ConstMatRef& s, std::span<const int> o_prev
   }
   logits.b.grad.col(0) += c.dz.rowwise().sum();
 
-  c.dx.resize(D, Tokens() * B);
+  c.dx.resize(D, form_.prev_embed_grad ? Tokens() * B : B);  // the state's token is the first
   block.Backward(c.x, W_o.value, memory_, masks, c.block, c.dtokens, c.dx, W_o.grad);
   auto dx0 = c.dx.leftCols(B);
   norm.Backward(c.norm, dx0, dx0);

@@ -46,7 +46,7 @@ struct OptionPolicyNet {
     Mat z, log_P, P;  // (K, B) logits, ln P, P
     Mat dz;           // (K, B) adjoint of z: the input of Backward, overwritten
     Mat relu;         // (D, B) state token before its LayerNorm
-    Mat x, dx;        // (D, n) query tokens
+    Mat x, dx;        // (D, n) query tokens; dx: only of those that pass a gradient on
     Mat dtokens;      // (D, n)
     LayerNorm::Cache norm;
     AttentionBlock::Cache block;

@@ -242,9 +242,10 @@ void AddInterpret(CLI::App& app) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   interpret->add_option("--seed", opt->seed, "of the episodes")->capture_default_str();
-  interpret->add_option("--out", opt->out,
-                        "CSV (default results/interpret/<fidelity>/<task>/option2vec/seed-NNN.csv "
-                        "of the run's own)");
+  interpret->add_option(
+      "--out", opt->out,
+      "CSV (default results/interpret/<fidelity>/<task>/option2vec/seed-NNN.csv "
+      "of the run's own);\nhow it was made stands beside it, with the ending .json");
   interpret->footer(
       "A row a dimension d: W_o(d, k); the mean over the visited states of d mu_a / d o_hat_d, "
       "o_hat the\nembedding of the option executed there; the mean change of mu_a by "
@@ -259,7 +260,8 @@ void AddInterpret(CLI::App& app) {
       throw ConfigError(Concat(file.string(), ": made by ", policy.config.algorithm,
                                ", whose options have no embedding"));
     }
-    if (opt->out.empty() && !ReadMetadata(file).contains("config")) {
+    const Metadata metadata = ReadMetadata(file);
+    if (opt->out.empty() && !metadata.contains("config")) {
       throw ConfigError(file.string() + ": does not say of which run it is; --out is needed");
     }
     const std::string& task = policy.env->Spec().id;
@@ -268,6 +270,8 @@ void AddInterpret(CLI::App& app) {
     if (out.has_parent_path()) std::filesystem::create_directories(out.parent_path());
     const Interpretation found = Interpret(*policy.algorithm, policy.normalizer, *policy.env,
                                            opt->episodes, opt->delta, opt->seed);
+    WriteFileAtomically(std::filesystem::path(out).replace_extension(".json"),
+                        InterpretationJson(found, metadata, task, opt->episodes, opt->seed));
     WriteFileAtomically(out, InterpretationCsv(found));
     std::cout << out.string() << ": " << found.W_o.rows() << " dimensions, " << found.states
               << " states of " << opt->episodes << " episodes on " << task << "\n";
@@ -297,7 +301,10 @@ void AddReplay(CLI::App& app, int& exit_code) {
   auto opt = std::make_shared<Options>();
   CLI::App* replay = app.add_subcommand("replay", "a recorded trajectory against our simulation");
   replay->add_option("--task", opt->task, "task id")->required();
-  replay->add_option("--trajectory", opt->trajectory, "CSV: step, ctrl0.., qpos0.., qvel0..")
+  replay
+      ->add_option("--trajectory", opt->trajectory,
+                   "CSV: step, ctrl0.., qpos0.., qvel0.., and perhaps reward, terminated, obs0..,\n"
+                   "target0..")
       ->required();
   replay->add_option("--out", opt->out, "our trajectory, same columns");
   replay->add_option("--tolerance", opt->tolerance, "largest |a - b| / max(1, |b|)")

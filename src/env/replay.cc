@@ -12,21 +12,41 @@
 namespace o2v {
 namespace {
 
-// Numbers of an episode's target in a row of the table: those of the task, or none.
-std::size_t TargetColumns(MujocoEnv& env, const CsvTable& table) {
-  const bool none = std::ranges::count(table.columns, "target0") == 0;
-  return none ? 0 : env.Target().size();
-}
+/// Where the parts of a row begin and how long they are; those that a table lacks are empty.
+struct Layout {
+  std::size_t nu, nq, nv, results, n_obs, target;
 
-void CheckColumns(MujocoEnv& env, const CsvTable& table) {
+  Layout(MujocoEnv& env, const CsvTable& table)
+      : nu(env.Spec().a_low.size()), nq(env.qpos().size()), nv(env.qvel().size()) {
+    const auto has = [&](const char* name) { return std::ranges::count(table.columns, name) > 0; };
+    n_obs = has("reward") ? std::size_t(env.Spec().S) : 0;
+    results = n_obs ? 2 : 0;  // reward, terminated
+    target = has("target0") ? env.Target().size() : 0;
+  }
+
+  std::span<double> ctrl(std::span<double> row) const { return row.subspan(1, nu); }
+  std::span<double> qpos(std::span<double> row) const { return row.subspan(1 + nu, nq); }
+  std::span<double> qvel(std::span<double> row) const { return row.subspan(1 + nu + nq, nv); }
+  std::span<double> result(std::span<double> row) const {
+    return row.subspan(1 + nu + nq + nv, results);
+  }
+  std::span<double> obs(std::span<double> row) const {
+    return row.subspan(1 + nu + nq + nv + results, n_obs);
+  }
+  std::span<double> goal(std::span<double> row) const { return row.last(target); }
+};
+
+void CheckColumns(const MujocoEnv& env, const Layout& at, const CsvTable& table) {
   std::vector<std::string> expected = {"step"};
   const auto add = [&](const char* name, std::size_t n) {
     for (std::size_t i = 0; i < n; ++i) expected.push_back(name + std::to_string(i));
   };
-  add("ctrl", env.Spec().a_low.size());
-  add("qpos", env.qpos().size());
-  add("qvel", env.qvel().size());
-  add("target", TargetColumns(env, table));
+  add("ctrl", at.nu);
+  add("qpos", at.nq);
+  add("qvel", at.nv);
+  if (at.results) expected.insert(expected.end(), {"reward", "terminated"});
+  add("obs", at.n_obs);
+  add("target", at.target);
   for (std::size_t i = 0; i < std::min(expected.size(), table.columns.size()); ++i) {
     if (table.columns[i] != expected[i]) {
       throw ConfigError(Concat(table.path, ":1: column ", i + 1, ": expected '", expected[i],
@@ -59,25 +79,28 @@ void CheckSteps(const CsvTable& table) {
 
 CsvTable Replay(Env& env, const CsvTable& trajectory) {
   auto& sim = dynamic_cast<MujocoEnv&>(env);
-  CheckColumns(sim, trajectory);
+  const Layout at(sim, trajectory);
+  CheckColumns(sim, at, trajectory);
   CheckSteps(trajectory);
-  const std::size_t nu = sim.Spec().a_low.size(), nq = sim.qpos().size(), nv = sim.qvel().size();
-  const std::span<double> target = sim.Target().first(TargetColumns(sim, trajectory));
+  const std::size_t width = trajectory.columns.size(), n = trajectory.Rows();
   std::vector<double> obs(static_cast<std::size_t>(sim.Spec().S));
   CsvTable ours = trajectory;
-  for (std::size_t row = 0; row < trajectory.Rows(); ++row) {
-    const std::size_t width = trajectory.columns.size();
-    const std::span<double> out(&ours.values[row * width], width);
-    const std::span<double> qpos = out.subspan(1 + nu, nq), qvel = out.subspan(1 + nu + nq, nv);
-    if (out[0] == 0) {
-      std::ranges::copy(out.last(target.size()), target.begin());
-      sim.ResetTo(qpos, qvel, obs);
-    } else {
-      sim.Step({&ours.values[(row - 1) * width + 1], nu}, obs);
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::span<double> row(&ours.values[i * width], width);
+    if (row[0] == 0) {
+      std::ranges::copy(at.goal(row), sim.Target().begin());
+      sim.ResetTo(at.qpos(row), at.qvel(row), obs);
     }
-    std::ranges::copy(sim.qpos(), qpos.begin());
-    std::ranges::copy(sim.qvel(), qvel.begin());
-    std::ranges::copy(target, out.last(target.size()).begin());
+    std::ranges::copy(sim.qpos(), at.qpos(row).begin());
+    std::ranges::copy(sim.qvel(), at.qvel(row).begin());
+    std::ranges::copy(sim.Target().first(at.target), at.goal(row).begin());
+    const bool last = i + 1 == n || trajectory.At(i + 1, 0) == 0;
+    if (last && std::ranges::all_of(at.obs(row), [](double x) { return x == 0; })) continue;
+    const StepResult step = sim.Step(at.ctrl(row), obs);
+    if (!at.results) continue;
+    at.result(row)[0] = step.reward;
+    at.result(row)[1] = step.terminated;
+    std::ranges::copy(obs, at.obs(row).begin());
   }
   return ours;
 }

@@ -18,13 +18,17 @@ struct Deviation {
 };
 
 /// Rolls a task along a trajectory. Columns: step, ctrl0.., qpos0.., qvel0..; a row holds the
-/// controls applied at that step and the state before it. A task with a target in its model
-/// (dm-reacher) may have it in further columns, target0.., of which only rows with step 0 are read.
+/// controls applied at that step and the state before it. Further columns, each of them optional:
+///   reward, terminated, obs0..   what the task returns after the step (a step oracle); the
+///                                last row before one with step 0, or of all, is a state only if
+///                                its observation is all zero
+///   target0..                    a target in the model (dm-reacher), of which only rows with step
+///                                0 are read
 /// A row with step 0 is injected (reset, state, target, forward call); the others are reached by
 /// stepping with the controls of the row before.
-/// Returns our states in the same rows and columns. Throws ConfigError, naming file, line and
-/// column, when the columns are not the model's or the steps do not count up; DivergedError as
-/// Env::Step. Source: spec/environments.md, Trajectories and step oracles.
+/// Returns ours in the same rows and columns. Throws ConfigError, naming file, line and column,
+/// when the columns are not the task's or the steps do not count up; DivergedError as Env::Step.
+/// Source: spec/environments.md, Trajectories and step oracles.
 CsvTable Replay(Env& env, const CsvTable& trajectory);
 
 /// Largest deviation of `ours` from a reference of the same shape, over the first `rows` rows of

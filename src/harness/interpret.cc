@@ -1,12 +1,14 @@
 #include "harness/interpret.h"
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "base/check.h"
 #include "base/csv.h"
 #include "harness/evaluate.h"
 #include "harness/jobs.h"
+#include "harness/manifest.h"
 
 namespace o2v {
 
@@ -60,6 +62,22 @@ std::string InterpretationCsv(const Interpretation& x) {
     table.values.push_back(x.delta);
   }
   return CsvText(table);
+}
+
+std::string InterpretationJson(const Interpretation& x, const Metadata& checkpoint,
+                               const std::string& task, int episodes, std::uint64_t seed) {
+  auto out = nlohmann::ordered_json::parse(BuildJson());
+  out["task"] = task;
+  out["episodes"] = episodes;
+  out["seed"] = seed;
+  out["states"] = x.states;
+  if (const auto found = checkpoint.find("total_steps"); found != checkpoint.end()) {
+    out["steps"] = std::stoll(found->second);
+  }
+  if (const auto found = checkpoint.find("config"); found != checkpoint.end()) {
+    out["config"] = found->second;
+  }
+  return out.dump(2) + "\n";
 }
 
 fs::path InterpretationPath(const RunConfig& config, const std::string& task) {

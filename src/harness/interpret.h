@@ -13,6 +13,7 @@
 
 #include "algo/algorithm.h"
 #include "env/env.h"
+#include "harness/checkpoint.h"
 #include "harness/config.h"
 #include "rollout/normalizer.h"
 
@@ -39,6 +40,12 @@ Interpretation Interpret(Algorithm& algorithm, const Normalizer& normalizer, Env
 
 /// A row a dimension: dimension, embedding_0.. (K), effect_0.. (A), perturbed_0.. (A), delta.
 std::string InterpretationCsv(const Interpretation& interpretation);
+
+/// How an interpretation was made, for the file beside its CSV: what the program was built from;
+/// steps and configuration of the run, where its checkpoint says them; task, episodes and their
+/// seed, states.
+std::string InterpretationJson(const Interpretation& interpretation, const Metadata& checkpoint,
+                               const std::string& task, int episodes, std::uint64_t seed);
 
 /// Where the figure and the report look for the interpretation of a run on a task:
 /// results/interpret/<fidelity>[-<switch>=<value>]/<task>/<method>/seed-NNN.csv

@@ -27,14 +27,14 @@ std::string CpuModel() {
   return "unknown";
 }
 
-/// Adds what the program was built from.
-void AddBuild(ordered_json& out) {
-  out["commit"] = kBuildCommit;
-  out["compiler"] = kBuildCompiler;
-  out["flags"] = kBuildFlags;
-  out["versions"] = {
-      {"eigen", Concat(EIGEN_WORLD_VERSION, '.', EIGEN_MAJOR_VERSION, '.', EIGEN_MINOR_VERSION)},
-      {"mujoco", PhysicsVersion()}};
+ordered_json Build() {
+  return {
+      {"commit", kBuildCommit},
+      {"compiler", kBuildCompiler},
+      {"flags", kBuildFlags},
+      {"versions",
+       {{"eigen", Concat(EIGEN_WORLD_VERSION, '.', EIGEN_MAJOR_VERSION, '.', EIGEN_MINOR_VERSION)},
+        {"mujoco", PhysicsVersion()}}}};
 }
 
 }  // namespace
@@ -48,6 +48,8 @@ RunStatus ParseStatus(const std::string& name) {
   throw Error("unknown status '" + name + "'");
 }
 
+std::string BuildJson() { return Build().dump(2) + "\n"; }
+
 std::string ManifestJson(const Manifest& manifest) {
   ordered_json out = {{"status", ToString(manifest.status)},
                       {"start", manifest.start},
@@ -57,7 +59,7 @@ std::string ManifestJson(const Manifest& manifest) {
                       {"cpu_seconds", manifest.cpu_seconds},
                       {"cpu", CpuModel()},
                       {"revision", manifest.revision}};
-  AddBuild(out);
+  out.update(Build());
   return out.dump(2) + "\n";
 }
 

@@ -24,6 +24,8 @@ struct Manifest {
   int revision = 1;  // of the method's code
 };
 
+/// What this program was built from, a JSON object: commit, compiler, flags, versions.
+std::string BuildJson();
 /// Text of a manifest.json.
 std::string ManifestJson(const Manifest& manifest);
 /// Writes `dir`/manifest.json.

@@ -103,7 +103,7 @@ void MemoryAttention::Backward(const ConstMatRef& x, const Mat& E, const Memory&
     for (Index k = 0; k < K; ++k) t[k] = a[k] * (t[k] - mean);
   }
   c.d_score_map.resize(D, heads * K);
-  SetAB(m.score_map, c.d_alpha, dx);
+  SetAB(m.score_map, c.d_alpha.leftCols(dx.cols()), dx);
   SetABt(x, c.d_alpha, c.d_score_map);
   c.d_score_map *= scale;
   c.d_score_bias = scale * c.d_alpha.rowwise().sum();

@@ -47,7 +47,7 @@ struct MemoryAttention {
   /// x (D, B) -> y (D, B). mask (H K, B) multiplies the attention weights; null: none.
   void Forward(const ConstMatRef& x, const Memory& memory, const Mat* mask, Cache& cache,
                MatRef y) const;
-  /// dy (D, B) -> dx (D, B); adds to the gradients and to dE (D, K).
+  /// dy (D, B) -> dx (D, n), of the first n samples; adds to the gradients and to dE (D, K).
   void Backward(const ConstMatRef& x, const Mat& E, const Memory& memory, const Mat* mask,
                 Cache& cache, const ConstMatRef& dy, MatRef dx, Mat& dE);
 

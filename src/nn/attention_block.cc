@@ -109,7 +109,7 @@ void AttentionBlock::Backward(const ConstMatRef& x, const Mat& E,
   CopyDropped(c.d_y, masks ? &masks->after_attention : nullptr, c.d_out);  // to the attention
   attention.Backward(x, E, memory, masks ? &masks->attention : nullptr, c.attention, c.d_out, dx,
                      dE);
-  dx += c.d_y;
+  dx += c.d_y.leftCols(dx.cols());
 }
 
 }  // namespace o2v

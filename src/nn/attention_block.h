@@ -43,7 +43,8 @@ struct AttentionBlock {
   /// x (D, n) -> cache.out (D, n). masks null: no dropout.
   void Forward(const ConstMatRef& x, const MemoryAttention::Memory& memory, const Masks* masks,
                Cache& cache) const;
-  /// dout (D, n), overwritten -> dx (D, n); adds to the gradients and to dE (D, K).
+  /// dout (D, n), overwritten -> dx (D, m), of the first m samples; adds to the gradients and to
+  /// dE (D, K).
   void Backward(const ConstMatRef& x, const Mat& E, const MemoryAttention::Memory& memory,
                 const Masks* masks, Cache& cache, Mat& dout, MatRef dx, Mat& dE);
 

@@ -88,7 +88,7 @@ TEST(Replay, RefusesMissingAndAdditionalColumns) {
             "t.csv:1: expected 6 columns for InvertedPendulum-v2 ('qvel1' is the first missing "
             "one), got 5");
   CsvTable longer{"t.csv",
-                  {"step", "ctrl0", "qpos0", "qpos1", "qvel0", "qvel1", "reward"},
+                  {"step", "ctrl0", "qpos0", "qpos1", "qvel0", "qvel1", "speed"},
                   {0, 0, 0, 0, 0, 0, 0}};
   EXPECT_EQ(ConfigErrorOf("InvertedPendulum-v2", longer),
             "t.csv:1: expected 6 columns for InvertedPendulum-v2 ('qvel1' is the last), got 7");
@@ -112,6 +112,34 @@ TEST(Replay, PutsATargetWhereTheRowsWithStepZeroSay) {
   }
   EXPECT_EQ(ConfigErrorOf("dm-reacher-hard", table),
             "t.csv:1: column 9: expected 'target1' for dm-reacher-hard, got 'target2'");
+}
+
+TEST(Replay, ComparesWhatTheTaskReturnsWhereTheTableHasIt) {
+  const std::filesystem::path file =
+      std::filesystem::path(O2V_TEST_DATA) / "env_steps" / "dm-reacher-easy.csv";
+  const CsvTable reference = ReadCsv(file);
+  ASSERT_EQ(reference.columns.back(), "target1");
+  CsvTable blank = reference;  // what the task returns must come from the task
+  const std::size_t reward = blank.Column("reward");
+  for (std::size_t row = 0; row < blank.Rows(); ++row) {
+    blank.values[row * blank.columns.size() + reward] = -1;
+  }
+  const CsvTable ours = Replay(*MakeEnv("dm-reacher-easy", EnvOptions{}), blank);
+  EXPECT_LT(LargestDeviation(ours, reference).value, 1e-8);
+  EXPECT_EQ(LargestDeviation(ours, blank).column, "reward");
+}
+
+TEST(Replay, ALastRowWithoutAnObservationIsAStateOnly) {
+  const std::vector<std::string> columns = {"step",  "ctrl0", "qpos0",  "qpos1",
+                                            "qvel0", "qvel1", "reward", "terminated",
+                                            "obs0",  "obs1",  "obs2",   "obs3"};
+  const CsvTable table{"t.csv", columns, {0, 0, 0, 0.1, 0, 0, 9, 9, 9, 9, 9, 9,  //
+                                          1, 0, 0, 0,   0, 0, 9, 9, 0, 0, 0, 0}};
+  const CsvTable ours = Replay(*MakeEnv("InvertedPendulum-v2", EnvOptions{}), table);
+  EXPECT_EQ(ours.At(0, 6), 1) << "reward of a step";
+  EXPECT_EQ(ours.At(0, 7), 0) << "upright";
+  EXPECT_EQ(ours.At(0, 9), ours.At(1, 3)) << "the angle observed is that of the next row";
+  EXPECT_EQ(ours.At(1, 6), 9) << "left as it is";
 }
 
 TEST(Replay, RefusesATargetForATaskWithoutOne) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <nlohmann/json.hpp>
 
 #include "algo/setup.h"
 #include "fake_run.h"
@@ -130,6 +131,25 @@ TEST(Interpretation, HasARowADimension) {
             "perturbed_1,delta\n"
             "0,1,2,3,0.5,-0.5,8,9,0.125\n"
             "1,4,5,6,0.25,7,10,11,0.125\n");
+}
+
+TEST(Interpretation, SaysHowItWasMade) {
+  Interpretation x;
+  x.states = 3000;
+  const auto json = nlohmann::json::parse(
+      InterpretationJson(x, {{"config", "[run]\n"}, {"total_steps", "2048"}}, "Hopper-v2", 10, 4));
+  for (const char* key : {"commit", "compiler", "flags", "versions"}) {
+    EXPECT_TRUE(json.contains(key)) << key;
+  }
+  EXPECT_EQ(json["task"], "Hopper-v2");
+  EXPECT_EQ(json["episodes"], 10);
+  EXPECT_EQ(json["seed"], 4);
+  EXPECT_EQ(json["states"], 3000);
+  EXPECT_EQ(json["steps"], 2048);
+  EXPECT_EQ(json["config"], "[run]\n");
+  EXPECT_FALSE(
+      nlohmann::json::parse(InterpretationJson(x, {}, "Hopper-v2", 10, 4)).contains("config"))
+      << "weights from elsewhere";
 }
 
 TEST(Interpretation, IsKeptByFidelityDeviationsTaskAndSeed) {

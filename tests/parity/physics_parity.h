@@ -57,38 +57,10 @@ inline ParityRow TrajectoryParity(MujocoEnv& env, const std::filesystem::path& d
           1e-9,         Where(d),        LargestDeviation(ours, reference).value};
 }
 
-/// Rolls a task from the rows with step 0 and writes down what it returns: reward, terminated, obs.
-/// The rows' other columns stay as they are, and so does the last row of the gym tasks, which is
-/// only a state (its observation is all zero).
-inline CsvTable RollSteps(MujocoEnv& env, const CsvTable& reference) {
-  const std::size_t width = reference.columns.size(), step = reference.Column("step");
-  const std::size_t ctrl = reference.Column("ctrl0"), qpos = reference.Column("qpos0"),
-                    qvel = reference.Column("qvel0"), reward = reference.Column("reward"),
-                    terminated = reference.Column("terminated"), obs = reference.Column("obs0");
-  const std::span<double> target = env.Target();
-  CsvTable ours = reference;
-  for (std::size_t row = 0; row < reference.Rows(); ++row) {
-    const std::span<double> out(&ours.values[row * width], width);
-    const std::span<double> out_obs = out.subspan(obs, std::size_t(env.Spec().S));
-    if (std::ranges::all_of(out_obs, [](double x) { return x == 0; })) break;
-    if (reference.At(row, step) == 0) {
-      if (!target.empty()) {
-        std::ranges::copy(out.subspan(reference.Column("target0"), target.size()), target.begin());
-      }
-      env.ResetTo(out.subspan(qpos, env.qpos().size()), out.subspan(qvel, env.qvel().size()),
-                  out_obs);
-    }
-    const StepResult result = env.Step(out.subspan(ctrl, env.Spec().a_low.size()), out_obs);
-    out[reward] = result.reward;
-    out[terminated] = result.terminated;
-  }
-  return ours;
-}
-
 /// A wrong `terminated` deviates by 1, and so breaks the bound.
 inline ParityRow StepParity(MujocoEnv& env, const std::filesystem::path& data) {
   const CsvTable reference = ReadCsv(data / "env_steps" / (env.Spec().id + ".csv"));
-  const CsvTable ours = RollSteps(env, reference);
+  const CsvTable ours = Replay(env, reference);
   const Deviation d = LargestDeviation(ours, reference, kBoundRows);
   return {"steps", env.Spec().id, d.value, 1e-8, Where(d), LargestDeviation(ours, reference).value};
 }
