@@ -17,7 +17,7 @@ find src -name '*.cc' -o -name '*.h' | sort | xargs awk '
     # Where third-party headers may appear; Eigen and the standard library may appear anywhere.
     home["mujoco"] = "^src/env/"
     home["toml++"] = "^src/harness/config\\.cc$"
-    home["nlohmann"] = "^src/harness/(manifest|checkpoint|record)\\.cc$"
+    home["nlohmann"] = "^src/harness/(manifest|checkpoint|record|interpret)\\.cc$"
     home["CLI"] = "^src/cli/"
   }
   /^[ \t]*#[ \t]*include[ \t]*"/ {
