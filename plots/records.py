@@ -46,6 +46,7 @@ FIDELITIES = ("paper", "released")
 SEEDS = range(10)  # of a whole grid
 MILLION = 1_000_000  # [environment steps] of training on a task
 LEFT_OUT = ("quick", "ci")  # experiments that are no evidence
+INTERPRETATIONS = "interpret"  # beside the experiments; plots/tables.py reads them
 NO_SETTINGS = ("run.seed", "run.checkpoint_every", "run.eval_every", "run.eval_episodes")
 
 
@@ -140,11 +141,11 @@ def number_or_nan(text: str) -> float:
 
 
 def load_cells(results: Path, experiments: Iterable[str] | None = None) -> dict[Key, Cell]:
-    """Cells of `experiments`; by default of all folders with records but quick and ci. Experiments
+    """Cells of `experiments`; by default of all folders of records but quick and ci. Experiments
     are pooled: the same run twice, or settings that differ within a cell, are errors."""
     if experiments is None:
         experiments = sorted(d.name for d in results.iterdir() if d.is_dir()
-                             and d.name not in LEFT_OUT) if results.is_dir() else []
+                             and d.name not in (*LEFT_OUT, INTERPRETATIONS)) if results.is_dir() else []
     groups: dict[Key, dict[int, Run]] = {}
     for experiment in experiments:
         for path in sorted((results / experiment).glob("*/*/*/seed-*.json")):

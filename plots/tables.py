@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from plots.records import (LEFT_OUT, Columns, DamagedFile, Rows, finite, number_or_nan,
-                           read_table)
+from plots.records import (INTERPRETATIONS, LEFT_OUT, Columns, DamagedFile, Rows, finite,
+                           number_or_nan, read_table)
 
 COLUMNS: dict[str, Columns] = {
     "params": {  # option2vec params --csv
@@ -92,7 +92,7 @@ def read_interpretations(results: Path, experiments: Sequence[str] | None = None
     if experiments is not None and set(experiments) <= set(LEFT_OUT):
         return {}
     found = {}
-    for path in sorted((results / "interpret").glob("*/*/*/seed-*.csv")):
+    for path in sorted((results / INTERPRETATIONS).glob("*/*/*/seed-*.csv")):
         with path.open(encoding="utf-8") as file:
             header = file.readline().rstrip("\n").split(",")
         K = sum(name.startswith("embedding_") for name in header)

@@ -199,6 +199,8 @@ class TablesTest(InFolder):
         good = ("dimension,embedding_0,embedding_1,embedding_2,effect_0,effect_1,perturbed_0,"
                 "perturbed_1,delta\n0,1,2,3,4,5,6,7,0.5\n1,8,9,10,11,12,13,14,0.5\n")
         path.write_text(good)
+        path.with_suffix(".json").write_text('{"episodes": 10}')  # how it was made; no record
+        self.assertEqual(load_cells(self.results), {})
         (where, found), = read_interpretations(self.results).items()
         self.assertEqual((where, found.delta), (path, 0.5))
         np.testing.assert_array_equal(found.W_o, [[1, 2, 3], [8, 9, 10]])
