@@ -68,16 +68,24 @@ TEST(ResolveRun, TakesTheMethodsNumbersFromItsOwnFile) {
   EXPECT_EQ(config.fidelity, Fidelity::kPaper);
 }
 
-TEST(ResolveRun, PpoWidthIs64InPaperAndOnFourReleasedTasksAnd128OnTheOthers) {
-  for (const EnvEntry& task : EnvRegistry()) {
-    const bool narrow = task.id == "HalfCheetah-v2" || task.id == "Walker2d-v2" ||
-                        task.id == "Swimmer-v2" || task.id == "Hopper-v2";  // spec 7
-    const RunConfig paper = ResolveRun(Request("ppo", task.id));
-    const RunConfig released = ResolveRun(Request("ppo", task.id, "released"));
-    EXPECT_EQ(paper.hyper.Int("hidden"), 64) << task.id;
-    EXPECT_EQ(released.hyper.Int("hidden"), narrow ? 64 : 128) << task.id;
-    EXPECT_EQ(paper.workers, 1) << task.id;
-    EXPECT_EQ(released.workers, 1) << task.id;
+TEST(ResolveRun, RivalsHaveTheWidthsAndWorkersOfTheirFidelity) {
+  std::vector<std::string> tasks;
+  for (const EnvEntry& task : EnvRegistry()) tasks.push_back(task.id);
+  for (const TaskPair& pair : PairRegistry()) tasks.push_back(pair.name);
+  for (const AlgorithmEntry& entry : AlgorithmRegistry()) {
+    const std::string& method = entry.id;
+    if (method == "option2vec") continue;
+    const bool onestep = method == "dac_onestep", four = method == "oc" || method == "iopg";
+    for (const std::string& task : tasks) {
+      const bool narrow = !onestep && (task == "HalfCheetah-v2" || task == "Walker2d-v2" ||
+                                       task == "Swimmer-v2" || task == "Hopper-v2");  // spec 7
+      const RunConfig paper = ResolveRun(Request(method, task));
+      const RunConfig released = ResolveRun(Request(method, task, "released"));
+      EXPECT_EQ(paper.hyper.Int("hidden"), 64) << method << task;
+      EXPECT_EQ(released.hyper.Int("hidden"), narrow ? 64 : 128) << method << task;
+      EXPECT_EQ(paper.workers, four ? 4 : 1) << method << task;
+      EXPECT_EQ(released.workers, four || onestep ? 4 : 1) << method << task;
+    }
   }
 }
 
@@ -117,15 +125,13 @@ TEST(ResolveRun, EmbeddingsOfReleasedPairsAreThoseOfTheLogs) {
   }
 }
 
-TEST(ResolveRun, RivalsUseReluAndReleasedWidth128OnDeepMindControl) {
+TEST(ResolveRun, RivalsUseReluOnDeepMindControl) {
   for (const AlgorithmEntry& entry : AlgorithmRegistry()) {
     const std::string& method = entry.id;
     if (method == "option2vec") continue;
     for (const std::string task : {"Walker2", "dm-fish-upright"}) {
       const RunConfig released = ResolveRun(Request(method, task, "released"));
       EXPECT_EQ(released.hyper.Int("activation"), 1) << method << task;
-      EXPECT_EQ(released.hyper.Int("hidden"), 128) << method << task;
-      EXPECT_EQ(ResolveRun(Request(method, task)).hyper.Int("hidden"), 64) << method << task;
     }
     EXPECT_EQ(ResolveRun(Request(method, "Hopper-v2")).hyper.Int("activation"), 0) << method;
   }
