@@ -15,14 +15,11 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
-matplotlib.use("svg")
-import matplotlib.pyplot as plt  # noqa: E402
-from matplotlib.artist import Artist  # noqa: E402
-from matplotlib.figure import Figure  # noqa: E402
-from matplotlib.lines import Line2D  # noqa: E402
-
-from plots.records import METHODS, DamagedFile  # noqa: E402
+from plots.records import METHODS, DamagedFile
 
 INK = "#1a1a1a"
 PAPER = "#ffffff"
@@ -64,8 +61,8 @@ class Drawing:
 
 def new_figure(width: float, height: float, rows: int, columns: int, **more) -> tuple[Figure, list]:
     """width, height [inch] -> the figure and its axes by row, [row][column]."""
-    plt.rcdefaults()
-    plt.rcParams.update({
+    matplotlib.rcdefaults()
+    matplotlib.rcParams.update({
         "font.family": "DejaVu Sans", "font.size": 8, "axes.titlesize": 8, "legend.fontsize": 8,
         "text.color": INK, "axes.edgecolor": INK, "axes.labelcolor": INK, "xtick.color": INK,
         "ytick.color": INK, "figure.facecolor": PAPER, "axes.facecolor": PAPER,
@@ -74,8 +71,8 @@ def new_figure(width: float, height: float, rows: int, columns: int, **more) -> 
         "axes.grid": True, "grid.color": GREY, "grid.alpha": 0.25, "grid.linewidth": 0.5,
         "hatch.linewidth": 0.6, "svg.hashsalt": "option2vec", "svg.fonttype": "path",
     })
-    figure, axes = plt.subplots(rows, columns, figsize=(width, height), squeeze=False,
-                                layout="constrained", **more)
+    figure = Figure(figsize=(width, height), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False, **more)
     return figure, [list(row) for row in axes]
 
 
