@@ -25,7 +25,7 @@ class Initialiser {
  public:
   Initialiser() = default;
   /// Draws from `rng`, which is kept. Implicit: a stream is all that a network's maker has.
-  Initialiser(Rng& rng) : rng_(&rng) {}
+  Initialiser(Rng& rng) : rng_(&rng) {}  // NOLINT(google-explicit-constructor)
 
   void Orthogonal(Mat& W, double gain) const;
   void XavierUniform(Mat& W) const;
