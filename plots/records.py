@@ -144,8 +144,8 @@ def load_cells(results: Path, experiments: Iterable[str] | None = None) -> dict[
     """Cells of `experiments`; by default of all folders of records but quick and ci. Experiments
     are pooled: the same run twice, or settings that differ within a cell, are errors."""
     if experiments is None:
-        experiments = sorted(d.name for d in results.iterdir() if d.is_dir()
-                             and d.name not in (*LEFT_OUT, INTERPRETATIONS)) if results.is_dir() else []
+        folders = [d.name for d in results.iterdir() if d.is_dir()] if results.is_dir() else []
+        experiments = sorted(set(folders) - {*LEFT_OUT, INTERPRETATIONS})
     groups: dict[Key, dict[int, Run]] = {}
     for experiment in experiments:
         for path in sorted((results / experiment).glob("*/*/*/seed-*.json")):

@@ -264,6 +264,10 @@ void AddInterpret(CLI::App& app) {
     if (opt->out.empty() && !metadata.contains("config")) {
       throw ConfigError(file.string() + ": does not say of which run it is; --out is needed");
     }
+    if (opt->out.extension() == ".json") {
+      throw ConfigError(opt->out.string() +
+                        ": a CSV is written there; .json is the file beside it");
+    }
     const std::string& task = policy.env->Spec().id;
     const std::filesystem::path out =
         opt->out.empty() ? InterpretationPath(policy.config, task) : opt->out;

@@ -14,24 +14,20 @@ namespace {
 
 /// Where the parts of a row begin and how long they are; those that a table lacks are empty.
 struct Layout {
-  std::size_t nu, nq, nv, results, n_obs, target;
+  std::size_t nu, nq, nv, returned, target;
 
   Layout(MujocoEnv& env, const CsvTable& table)
       : nu(env.Spec().a_low.size()), nq(env.qpos().size()), nv(env.qvel().size()) {
     const auto has = [&](const char* name) { return std::ranges::count(table.columns, name) > 0; };
-    n_obs = has("reward") ? std::size_t(env.Spec().S) : 0;
-    results = n_obs ? 2 : 0;  // reward, terminated
+    returned = has("reward") ? 2 + std::size_t(env.Spec().S) : 0;  // reward, terminated, obs
     target = has("target0") ? env.Target().size() : 0;
   }
 
   std::span<double> ctrl(std::span<double> row) const { return row.subspan(1, nu); }
   std::span<double> qpos(std::span<double> row) const { return row.subspan(1 + nu, nq); }
   std::span<double> qvel(std::span<double> row) const { return row.subspan(1 + nu + nq, nv); }
-  std::span<double> result(std::span<double> row) const {
-    return row.subspan(1 + nu + nq + nv, results);
-  }
-  std::span<double> obs(std::span<double> row) const {
-    return row.subspan(1 + nu + nq + nv + results, n_obs);
+  std::span<double> results(std::span<double> row) const {
+    return row.subspan(1 + nu + nq + nv, returned);
   }
   std::span<double> goal(std::span<double> row) const { return row.last(target); }
 };
@@ -44,8 +40,10 @@ void CheckColumns(const MujocoEnv& env, const Layout& at, const CsvTable& table)
   add("ctrl", at.nu);
   add("qpos", at.nq);
   add("qvel", at.nv);
-  if (at.results) expected.insert(expected.end(), {"reward", "terminated"});
-  add("obs", at.n_obs);
+  if (at.returned) {
+    expected.insert(expected.end(), {"reward", "terminated"});
+    add("obs", at.returned - 2);
+  }
   add("target", at.target);
   for (std::size_t i = 0; i < std::min(expected.size(), table.columns.size()); ++i) {
     if (table.columns[i] != expected[i]) {
@@ -95,12 +93,13 @@ CsvTable Replay(Env& env, const CsvTable& trajectory) {
     std::ranges::copy(sim.qvel(), at.qvel(row).begin());
     std::ranges::copy(sim.Target().first(at.target), at.goal(row).begin());
     const bool last = i + 1 == n || trajectory.At(i + 1, 0) == 0;
-    if (last && std::ranges::all_of(at.obs(row), [](double x) { return x == 0; })) continue;
+    const std::span<double> results = at.results(row);
+    if (last && std::ranges::all_of(results, [](double x) { return x == 0; })) continue;
     const StepResult step = sim.Step(at.ctrl(row), obs);
-    if (!at.results) continue;
-    at.result(row)[0] = step.reward;
-    at.result(row)[1] = step.terminated;
-    std::ranges::copy(obs, at.obs(row).begin());
+    if (results.empty()) continue;
+    results[0] = step.reward;
+    results[1] = step.terminated;
+    std::ranges::copy(obs, results.begin() + 2);
   }
   return ours;
 }

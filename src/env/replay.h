@@ -19,9 +19,9 @@ struct Deviation {
 
 /// Rolls a task along a trajectory. Columns: step, ctrl0.., qpos0.., qvel0..; a row holds the
 /// controls applied at that step and the state before it. Further columns, each of them optional:
-///   reward, terminated, obs0..   what the task returns after the step (a step oracle); the
-///                                last row before one with step 0, or of all, is a state only if
-///                                its observation is all zero
+///   reward, terminated, obs0..   what the task returns after the step (a step oracle); where all
+///                                of them are 0, the last row, or the last before one with step 0,
+///                                is only a state
 ///   target0..                    a target in the model (dm-reacher), of which only rows with step
 ///                                0 are read
 /// A row with step 0 is injected (reset, state, target, forward call); the others are reached by

@@ -168,6 +168,7 @@ TEST_F(Program, InterpretsTheEmbeddingRepeatably) {
   ASSERT_EQ(Run("interpret run/last.ckpt --episodes 2 --out new/b.csv").code, 0);
   EXPECT_EQ(ReadFile(dir_ / "new/b.csv"), ReadFile(dir_ / path));
   EXPECT_NE(ReadFile(dir_ / "new/b.json").find("\"episodes\": 2"), std::string::npos);
+  EXPECT_EQ(Run("interpret run --episodes 2 --out c.json").code, 2);
   ASSERT_EQ(Run("interpret run --episodes 2 --seed 1 --out c.csv").code, 0);
   EXPECT_NE(ReadFile(dir_ / "c.csv"), ReadFile(dir_ / path));
 }

@@ -129,17 +129,22 @@ TEST(Replay, ComparesWhatTheTaskReturnsWhereTheTableHasIt) {
   EXPECT_EQ(LargestDeviation(ours, blank).column, "reward");
 }
 
-TEST(Replay, ALastRowWithoutAnObservationIsAStateOnly) {
+TEST(Replay, ALastRowOfZerosIsOnlyAState) {
   const std::vector<std::string> columns = {"step",  "ctrl0", "qpos0",  "qpos1",
                                             "qvel0", "qvel1", "reward", "terminated",
                                             "obs0",  "obs1",  "obs2",   "obs3"};
   const CsvTable table{"t.csv", columns, {0, 0, 0, 0.1, 0, 0, 9, 9, 9, 9, 9, 9,  //
-                                          1, 0, 0, 0,   0, 0, 9, 9, 0, 0, 0, 0}};
-  const CsvTable ours = Replay(*MakeEnv("InvertedPendulum-v2", EnvOptions{}), table);
+                                          1, 0, 0, 0,   0, 0, 0, 0, 0, 0, 0, 0}};
+  CsvTable ours = Replay(*MakeEnv("InvertedPendulum-v2", EnvOptions{}), table);
   EXPECT_EQ(ours.At(0, 6), 1) << "reward of a step";
   EXPECT_EQ(ours.At(0, 7), 0) << "upright";
   EXPECT_EQ(ours.At(0, 9), ours.At(1, 3)) << "the angle observed is that of the next row";
-  EXPECT_EQ(ours.At(1, 6), 9) << "left as it is";
+  EXPECT_EQ(ours.At(1, 6), 0) << "left as it is";
+  CsvTable rewarded = table;
+  rewarded.values[12 + 6] = 9;
+  ours = Replay(*MakeEnv("InvertedPendulum-v2", EnvOptions{}), rewarded);
+  EXPECT_EQ(ours.At(1, 6), 1) << "a reward makes it a step, whose observation is not zero";
+  EXPECT_NE(ours.At(1, 9), 0);
 }
 
 TEST(Replay, RefusesATargetForATaskWithoutOne) {

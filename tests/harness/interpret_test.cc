@@ -150,6 +150,10 @@ TEST(Interpretation, SaysHowItWasMade) {
   EXPECT_FALSE(
       nlohmann::json::parse(InterpretationJson(x, {}, "Hopper-v2", 10, 4)).contains("config"))
       << "weights from elsewhere";
+  EXPECT_EQ(Message<Error>([&] {
+              InterpretationJson(x, {{"total_steps", "9x"}}, "t", 1, 0);
+            }),
+            "checkpoint: total_steps is '9x', not a whole number");
 }
 
 TEST(Interpretation, IsKeptByFidelityDeviationsTaskAndSeed) {
