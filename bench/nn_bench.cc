@@ -9,11 +9,37 @@
 #include "nn/dropout.h"
 #include "nn/embedding.h"
 #include "nn/mlp.h"
+#include "nn/product.h"
 
 namespace o2v {
 namespace {
 
 constexpr Index S = 17, A = 6, K = 4, D = 40, F = 50, h = 64, B = 64;
+
+/// C (m, n) = A (m, k) B (k, n): ours, or a bare Eigen product.
+void BM_Product(benchmark::State& state) {
+  const Index m = state.range(1), k = state.range(2), n = state.range(3);
+  const Mat a = Mat::Random(m, k), b = Mat::Random(k, n);
+  Mat c(m, n);
+  for (auto _ : state) {
+    if (state.range(0)) {
+      SetAB(a, b, c);
+    } else {
+      c.noalias() = a * b;
+    }
+    benchmark::DoNotOptimize(c.data());
+    benchmark::ClobberMemory();
+  }
+  const double flop = 2.0 * double(m) * double(k) * double(n) * double(state.iterations());
+  state.counters["GFLOP/s"] = benchmark::Counter(flop / 1e9, benchmark::Counter::kIsRate);
+}
+BENCHMARK(BM_Product)
+    ->ArgNames({"ours", "m", "k", "n"})
+    ->ArgsProduct({{0, 1}, {h}, {S}, {B}})
+    ->ArgsProduct({{0, 1}, {h}, {h}, {B}})
+    ->ArgsProduct({{0, 1}, {F}, {D}, {2 * B}})
+    ->ArgsProduct({{0, 1}, {K}, {D}, {2 * B}})
+    ->ArgsProduct({{0, 1}, {D}, {K}, {2 * B}});
 
 void BM_BodyForward(benchmark::State& state) {
   Rng rng(1, "bench");

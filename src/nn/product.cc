@@ -1,9 +1,152 @@
 #include "nn/product.h"
 
+#include <algorithm>
+
 #include "base/check.h"
+#include "nn/lanes.h"
+
+// Eigen's own product copies both factors into panels, for matrices far beyond the caches. Ours fit
+// into the first ones, and many are but a few rows or columns thin (K options, A actions): copying
+// would cost more than multiplying. Here 16, 8 or 4 rows of A, a strip, pass over all of B, and
+// only a strip whose rows lie apart is copied (BM_Product compares).
+//
+// Every entry of C is one sum over k in rising order, by blocks of kDepth, whatever its place, the
+// width of the batch or the size of the machine's caches.
 
 namespace o2v {
 namespace {
+
+constexpr int kLanes = 32 / sizeof(Real);  // of an AVX2 register
+constexpr Index kDepth = 128;              // columns of a strip: 8 kB, of the first cache's 32
+
+/// A factor or its transpose: entry (i, j) is data[i row + j col].
+struct Factor {
+  const Real* data;
+  Index row, col;
+
+  Factor From(Index i, Index j) const { return {data + i * row + j * col, row, col}; }
+  Factor Transposed() const { return {data, col, row}; }
+};
+Factor Plain(const ConstMatRef& X) { return {X.data(), 1, X.outerStride()}; }
+Factor Transposed(const ConstMatRef& X) { return Plain(X).Transposed(); }
+
+/// The product, likewise; added to what is there, or put in its place.
+struct Target {
+  Real* data;
+  Index row, col;
+  bool add;
+
+  Target From(Index i, Index j) const { return {data + i * row + j * col, row, col, add}; }
+};
+
+/// Rows of A whose entries lie together, the columns `col` apart: (kN kRegs, k).
+struct Strip {
+  const Real* data;
+  Index col;
+};
+
+/// C (rows, kCols) (+)= strip B (k, kCols), of the strip the first rows. The sums stay in
+/// registers.
+template <int kN, int kRegs, int kCols>
+void MultiplyTile(Strip strip, const Factor& B, Index rows, Index k, const Target& C) {
+  constexpr Index kHeight = kN * kRegs;
+  Lanes<kN> sum[kCols][kRegs];
+  for (int j = 0; j < kCols; ++j) {
+    for (int r = 0; r < kRegs; ++r) sum[j][r].setZero();
+  }
+  for (Index q = 0; q < k; ++q, strip.data += strip.col) {
+    Lanes<kN> a[kRegs];
+    for (int r = 0; r < kRegs; ++r) a[r] = At<kN>(strip.data + r * kN);
+    for (int j = 0; j < kCols; ++j) {
+      const Real b = B.data[q * B.row + j * B.col];
+      for (int r = 0; r < kRegs; ++r) sum[j][r] += a[r] * b;
+    }
+  }
+  if (rows == kHeight && C.row == 1) {
+    for (int j = 0; j < kCols; ++j) {
+      for (int r = 0; r < kRegs; ++r) {
+        auto c = At<kN>(C.data + j * C.col + r * kN);
+        c = C.add ? Lanes<kN>(c + sum[j][r]) : sum[j][r];
+      }
+    }
+    return;
+  }
+  Real out[kCols * kHeight];
+  for (int j = 0; j < kCols; ++j) {
+    for (int r = 0; r < kRegs; ++r) At<kN>(out + j * kHeight + r * kN) = sum[j][r];
+  }
+  for (int j = 0; j < kCols; ++j) {
+    for (Index i = 0; i < rows; ++i) {
+      Real& c = C.data[i * C.row + j * C.col];
+      c = C.add ? c + out[j * kHeight + i] : out[j * kHeight + i];
+    }
+  }
+}
+
+/// C (rows, n) (+)= strip B (k, n), kCols columns at once and what is left by fewer.
+template <int kN, int kRegs, int kCols>
+void MultiplyColumns(Strip strip, Factor B, Index rows, Index k, Index n, Target C) {
+  for (; n >= kCols; n -= kCols) {
+    MultiplyTile<kN, kRegs, kCols>(strip, B, rows, k, C);
+    B = B.From(0, kCols);
+    C = C.From(0, kCols);
+  }
+  if constexpr (kCols > 1) {
+    MultiplyColumns<kN, kRegs, (kCols > 4 ? 4 : kCols / 2)>(strip, B, rows, k, n, C);
+  }
+}
+
+/// C (rows, n) (+)= A (rows, k) B (k, n), rows at most kN kRegs and k at most kDepth.
+template <int kN, int kRegs, int kCols>
+void MultiplyStrip(const Factor& A, const Factor& B, Index rows, Index k, Index n,
+                   const Target& C) {
+  constexpr Index kHeight = kN * kRegs;
+  if (A.row == 1 && rows == kHeight) {
+    MultiplyColumns<kN, kRegs, kCols>({A.data, A.col}, B, rows, k, n, C);
+    return;
+  }
+  alignas(32) Real copy[kHeight * kDepth];
+  if (A.col == 1 && rows == kHeight) {
+    using Columns = Eigen::Matrix<Real, Eigen::Dynamic, kHeight>;
+    const Eigen::Map<const Columns, 0, Eigen::OuterStride<>> from(A.data, k, kHeight, {A.row});
+    Eigen::Map<Eigen::Matrix<Real, kHeight, Eigen::Dynamic>>(copy, kHeight, k) = from.transpose();
+  } else {
+    for (Index q = 0; q < k; ++q) {
+      for (Index i = 0; i < kHeight; ++i) {
+        copy[q * kHeight + i] = i < rows ? A.data[i * A.row + q * A.col] : Real(0);
+      }
+    }
+  }
+  MultiplyColumns<kN, kRegs, kCols>({copy, kHeight}, B, rows, k, n, C);
+}
+
+/// C (m, n) (+)= A (m, k) B (k, n).
+void Multiply(const Factor& A, const Factor& B, Index m, Index k, Index n, Target C) {
+  // C^T = B^T A^T where A is thin and B^T needs no copy, or where both do and B^T is the smaller.
+  const bool copy_A = A.row != 1, copy_B = B.col != 1;
+  if (copy_B ? copy_A && n < m : !copy_A && m <= kLanes && m < n) {
+    Multiply(B.Transposed(), A.Transposed(), n, k, m, {C.data, C.col, C.row, C.add});
+    return;
+  }
+  for (Index q = 0; q == 0 || q < k; q += kDepth, C.add = true) {
+    const Index depth = std::min(kDepth, k - q);
+    for (Index i = 0; i < m;) {
+      const Factor a = A.From(i, q), b = B.From(q, 0);
+      const Target c = C.From(i, 0);
+      // 12 or 8 sums at once: enough to hide an addition's latency, and no more than registers.
+      if (m - i >= 2 * kLanes) {
+        MultiplyStrip<kLanes, 2, 6>(a, b, 2 * kLanes, depth, n, c);
+        i += 2 * kLanes;
+      } else if (m - i > kLanes / 2) {
+        MultiplyStrip<kLanes, 1, 8>(a, b, std::min<Index>(m - i, kLanes), depth, n, c);
+        i += kLanes;
+      } else {
+        MultiplyStrip<kLanes / 2, 1, 8>(a, b, m - i, depth, n, c);
+        i += kLanes / 2;
+      }
+    }
+  }
+}
 
 void CheckShapes(Index m, Index k, Index k2, Index n, const MatRef& C) {
   Check(k == k2 && C.rows() == m && C.cols() == n, "product: (", m, ", ", k, ") times (", k2, ", ",
@@ -14,32 +157,36 @@ void CheckShapes(Index m, Index k, Index k2, Index n, const MatRef& C) {
 
 void SetAB(const ConstMatRef& A, const ConstMatRef& B, MatRef C) {
   CheckShapes(A.rows(), A.cols(), B.rows(), B.cols(), C);
-  C.noalias() = A * B;
+  Multiply(Plain(A), Plain(B), A.rows(), A.cols(), B.cols(), {C.data(), 1, C.outerStride(), false});
 }
 
 void AddAB(const ConstMatRef& A, const ConstMatRef& B, MatRef C) {
   CheckShapes(A.rows(), A.cols(), B.rows(), B.cols(), C);
-  C.noalias() += A * B;
+  Multiply(Plain(A), Plain(B), A.rows(), A.cols(), B.cols(), {C.data(), 1, C.outerStride(), true});
 }
 
 void SetABt(const ConstMatRef& A, const ConstMatRef& B, MatRef C) {
   CheckShapes(A.rows(), A.cols(), B.cols(), B.rows(), C);
-  C.noalias() = A * B.transpose();
+  Multiply(Plain(A), Transposed(B), A.rows(), A.cols(), B.rows(),
+           {C.data(), 1, C.outerStride(), false});
 }
 
 void AddABt(const ConstMatRef& A, const ConstMatRef& B, MatRef C) {
   CheckShapes(A.rows(), A.cols(), B.cols(), B.rows(), C);
-  C.noalias() += A * B.transpose();
+  Multiply(Plain(A), Transposed(B), A.rows(), A.cols(), B.rows(),
+           {C.data(), 1, C.outerStride(), true});
 }
 
 void SetAtB(const ConstMatRef& A, const ConstMatRef& B, MatRef C) {
   CheckShapes(A.cols(), A.rows(), B.rows(), B.cols(), C);
-  C.noalias() = A.transpose() * B;
+  Multiply(Transposed(A), Plain(B), A.cols(), A.rows(), B.cols(),
+           {C.data(), 1, C.outerStride(), false});
 }
 
 void AddAtB(const ConstMatRef& A, const ConstMatRef& B, MatRef C) {
   CheckShapes(A.cols(), A.rows(), B.rows(), B.cols(), C);
-  C.noalias() += A.transpose() * B;
+  Multiply(Transposed(A), Plain(B), A.cols(), A.rows(), B.cols(),
+           {C.data(), 1, C.outerStride(), true});
 }
 
 }  // namespace o2v

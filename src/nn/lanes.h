@@ -1,0 +1,55 @@
+#pragma once
+// Loops over short columns, in vector registers: a column has D = 20 to 40 entries, so that block
+// expressions of run-time size would cost more than the arithmetic.
+
+#include <type_traits>
+
+#include "base/types.h"
+
+namespace o2v {
+
+/// kN numbers that are worked on at once.
+template <int kN>
+using Lanes = Eigen::Array<Real, kN, 1>;
+
+template <int kN>
+Eigen::Map<Lanes<kN>> At(Real* x) {
+  return Eigen::Map<Lanes<kN>>(x);
+}
+template <int kN>
+Eigen::Map<const Lanes<kN>> At(const Real* x) {
+  return Eigen::Map<const Lanes<kN>>(x);
+}
+
+/// Calls f(kN, i), kN a constant, for pieces [i, i + kN) that make up [0, n): of 8, one of 4, of 1.
+template <typename F>
+void ForLanes(Index n, F&& f) {
+  Index i = 0;
+  for (; i + 8 <= n; i += 8) f(std::integral_constant<int, 8>(), i);
+  if (i + 4 <= n) {
+    f(std::integral_constant<int, 4>(), i);
+    i += 4;
+  }
+  for (; i < n; ++i) f(std::integral_constant<int, 1>(), i);
+}
+
+/// A sum over the pieces of ForLanes.
+struct LaneSum {
+  Lanes<8> eights = Lanes<8>::Zero();
+  Lanes<4> four = Lanes<4>::Zero();
+  Lanes<1> ones = Lanes<1>::Zero();
+
+  template <typename Piece>
+  void Add(const Piece& x) {
+    if constexpr (Piece::SizeAtCompileTime == 8) {
+      eights += x;
+    } else if constexpr (Piece::SizeAtCompileTime == 4) {
+      four += x;
+    } else {
+      ones += x;
+    }
+  }
+  Real Total() const { return eights.sum() + four.sum() + ones(0); }
+};
+
+}  // namespace o2v
