@@ -89,7 +89,7 @@ std::string CsvTable::Place(std::size_t row, std::size_t column) const {
   return Concat(path, ":", row + 2, ": column '", columns[column], "': ");
 }
 
-CsvTable ReadCsv(const std::filesystem::path& path) {
+CsvTable ReadCsv(const std::filesystem::path& path, CsvGaps gaps) {
   const std::string text = ReadText(path);
   CsvTable table{path.string(), {}, {}};
   std::string_view rest = text;
@@ -102,10 +102,13 @@ CsvTable ReadCsv(const std::filesystem::path& path) {
                                " numbers, got ", line.empty() ? 0 : fields));
     }
     for (std::size_t column = 0; column < fields; ++column) {
-      table.values.push_back(ReadNumber(Cut(line, ','), table, row, column));
+      const std::string_view cell = Cut(line, ',');
+      table.values.push_back(gaps.cells && cell.empty() ? std::nan("")
+                                                        : ReadNumber(cell, table, row, column));
     }
   }
-  if (table.values.empty()) throw ConfigError(table.path + ": no rows after the header");
+  if (table.values.empty() && !gaps.rows)
+    throw ConfigError(table.path + ": no rows after the header");
   return table;
 }
 

@@ -24,9 +24,15 @@ struct CsvTable {
   std::string Place(std::size_t row, std::size_t column) const;
 };
 
+/// What a table may do without.
+struct CsvGaps {
+  bool rows = false;   // there may be none after the header
+  bool cells = false;  // one may be empty, and is read as NaN
+};
+
 /// Reads a table. Throws ConfigError, naming file, line and column, unless there is a header and
 /// every line after it holds one finite number for each column; at most 1 GiB is read.
-CsvTable ReadCsv(const std::filesystem::path& path);
+CsvTable ReadCsv(const std::filesystem::path& path, CsvGaps gaps = {});
 
 /// The table as text; every number is read back as it was (17 digits).
 std::string CsvText(const CsvTable& table);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <charconv>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -319,6 +320,17 @@ Metadata LoadCheckpoint(const std::filesystem::path& path, Algorithm& algorithm,
 }
 
 Metadata ReadMetadata(const std::filesystem::path& path) { return ParseFile(path).metadata; }
+
+std::optional<std::int64_t> TotalSteps(const Metadata& metadata) {
+  const auto found = metadata.find("total_steps");
+  if (found == metadata.end()) return std::nullopt;
+  const std::string& text = found->second;
+  std::int64_t steps = 0;
+  const auto [end, bad] = std::from_chars(text.data(), text.data() + text.size(), steps);
+  Check(bad == std::errc() && end == text.data() + text.size(), "checkpoint: total_steps is '",
+        text, "', not a whole number");
+  return steps;
+}
 
 void LoadPolicy(const std::filesystem::path& path, Algorithm& algorithm, Normalizer& normalizer) {
   const File file = ParseFile(path);

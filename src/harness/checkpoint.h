@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "algo/algorithm.h"
@@ -37,6 +38,8 @@ Metadata LoadCheckpoint(const std::filesystem::path& path, Algorithm& algorithm,
 
 /// The metadata of a file; empty for one from elsewhere that has none.
 Metadata ReadMetadata(const std::filesystem::path& path);
+/// Environment steps of the run that wrote it; nothing where the metadata does not say.
+std::optional<std::int64_t> TotalSteps(const Metadata& metadata);
 
 /// Sets parameters and normaliser only. Also takes files from elsewhere: no metadata, no training
 /// state, no normalizer.count, F64 numbers. Every parameter must be there with its shape and finite

@@ -1,6 +1,5 @@
 #include "harness/interpret.h"
 
-#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <vector>
@@ -72,14 +71,7 @@ std::string InterpretationJson(const Interpretation& x, const Metadata& checkpoi
   out["episodes"] = episodes;
   out["seed"] = seed;
   out["states"] = x.states;
-  if (const auto found = checkpoint.find("total_steps"); found != checkpoint.end()) {
-    std::int64_t steps = 0;
-    const std::string& text = found->second;
-    const auto [end, bad] = std::from_chars(text.data(), text.data() + text.size(), steps);
-    Check(bad == std::errc() && end == text.data() + text.size(), "checkpoint: total_steps is '",
-          text, "', not a whole number");
-    out["steps"] = steps;
-  }
+  if (const auto steps = TotalSteps(checkpoint)) out["steps"] = *steps;
   if (const auto found = checkpoint.find("config"); found != checkpoint.end()) {
     out["config"] = found->second;
   }

@@ -143,8 +143,7 @@ void RunLogs::Visit(StateVisitor& v) {
 
 std::vector<CurvePoint> ReadEpisodes(const std::filesystem::path& path) {
   std::vector<CurvePoint> episodes;
-  if (ReadFile(path) == Concat(kEpisodesHeader, "\n")) return episodes;  // no episode has ended
-  const CsvTable table = ReadCsv(path);
+  const CsvTable table = ReadCsv(path, {.rows = true});  // none before the first episode has ended
   const std::size_t step = table.Column("step"), ret = table.Column("return");
   for (std::size_t row = 0; row < table.Rows(); ++row) {
     episodes.emplace_back(static_cast<std::int64_t>(table.At(row, step)), table.At(row, ret));
@@ -153,8 +152,8 @@ std::vector<CurvePoint> ReadEpisodes(const std::filesystem::path& path) {
 }
 
 CsvTable ReadUpdates(const std::filesystem::path& path) {
-  const std::string text = ReadFile(path);
-  return std::ranges::count(text, '\n') > 1 ? ReadCsv(path) : CsvTable{};
+  CsvTable table = ReadCsv(path, {.rows = true});
+  return table.Rows() > 0 ? std::move(table) : CsvTable{};
 }
 
 std::vector<CurvePoint> SmoothedReturns(std::span<const CurvePoint> episodes) {

@@ -1,7 +1,6 @@
 #include "harness/summary.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <iomanip>
 #include <map>
@@ -11,6 +10,7 @@
 
 #include "base/align.h"
 #include "base/check.h"
+#include "base/csv.h"
 #include "base/files.h"
 #include "embedded/reference.h"
 #include "env/pairs.h"
@@ -60,28 +60,16 @@ struct RunRecord {
   std::vector<CurvePoint> curve;  // smoothed returns, by step; empty: fewer than 20 episodes
 };
 
-/// Step and return of each row of a RecordCsv. Of the options, where cells may be empty, only the
-/// number of cells is looked at.
+/// Step and return of each row of a RecordCsv. Cells of options may be empty.
 std::vector<CurvePoint> ReadCurve(const fs::path& csv) {
-  std::istringstream in(ReadFile(csv));
-  std::string line;
-  std::getline(in, line);
-  Check((line + ",").starts_with("step,return_20,"), csv.string(),
-        ":1: not the columns of a record");
-  const auto commas = std::ranges::count(line, ',');
+  const CsvTable table = ReadCsv(csv, {.rows = true, .cells = true});
+  const std::size_t step = table.Column("step"), ret = table.Column("return_20");
   std::vector<CurvePoint> curve;
-  while (std::getline(in, line)) {
-    const char* const end = line.data() + line.size();
-    CurvePoint point;
-    const auto [comma, bad_step] = std::from_chars(line.data(), end, point.first);
-    bool good = bad_step == std::errc() && comma != end && *comma == ',';
-    if (good) {
-      const auto [stop, bad_return] = std::from_chars(comma + 1, end, point.second);
-      good = bad_return == std::errc() && (stop == end || *stop == ',') &&
-             std::isfinite(point.second) && std::ranges::count(line, ',') == commas;
-    }
-    Check(good, csv.string(), ":", curve.size() + 2, ": not the row of a record");
-    curve.push_back(point);
+  for (std::size_t row = 0; row < table.Rows(); ++row) {
+    const double at = table.At(row, step), value = table.At(row, ret);
+    Check(at == std::floor(at), table.Place(row, step), "expected a whole number");
+    Check(std::isfinite(value), table.Place(row, ret), "expected a number");
+    curve.emplace_back(static_cast<std::int64_t>(at), value);
   }
   return curve;
 }

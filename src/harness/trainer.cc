@@ -205,10 +205,9 @@ class Run {
     if (fs::exists(path)) {
       if (parts_.tasks > 1) {
         // LoadCheckpoint wants the simulators of the task that the file was written on.
-        const Metadata of_file = ReadMetadata(path);
-        const auto steps = of_file.find("total_steps");
-        Check(steps != of_file.end(), path.string(), ": no total_steps in its metadata");
-        task_ = TaskAt(std::stoll(steps->second));
+        const auto steps = TotalSteps(ReadMetadata(path));
+        Check(steps.has_value(), path.string(), ": no total_steps in its metadata");
+        task_ = TaskAt(*steps);
         env_.ReplaceEnvs(MakeTask(task_));
       }
       const Metadata metadata = LoadCheckpoint(path, *algorithm_, Walk());

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdint>
 #include <fstream>
 #include <limits>
@@ -81,6 +82,19 @@ TEST_F(Csv, BadHeadersAreRefused) {
 }
 
 TEST_F(Csv, AFileWithoutRowsIsRefused) { EXPECT_EQ(ErrorOf("a\n"), ": no rows after the header"); }
+
+TEST_F(Csv, GapsAreReadWhereTheyAreAllowed) {
+  std::ofstream(path_) << "a\n";
+  EXPECT_EQ(ReadCsv(path_, {.rows = true}).Rows(), 0u);
+  EXPECT_THROW(ReadCsv(path_, {.cells = true}), ConfigError);
+  std::ofstream(path_) << "a,b,c\n1,,3\n4,5,\n";
+  const CsvTable table = ReadCsv(path_, {.cells = true});
+  EXPECT_EQ(table.Rows(), 2u);
+  EXPECT_TRUE(std::isnan(table.At(0, 1)));
+  EXPECT_EQ(table.At(0, 2), 3);
+  EXPECT_TRUE(std::isnan(table.At(1, 2)));
+  EXPECT_THROW(ReadCsv(path_, {.rows = true}), ConfigError);
+}
 
 TEST_F(Csv, MissingFilesAndFoldersAreRefused) {
   EXPECT_THROW(ReadCsv(path_ + ".missing"), ConfigError);

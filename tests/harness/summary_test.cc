@@ -111,7 +111,7 @@ TEST_F(Summary, ReadsRecordsWithEmptyCellsOfOptions) {
   const std::string header = "step,return_20,usage_0,duration_0_steps\n";
   WriteFileAtomically(csv, header + "10000,-1e-05,0,\n20000,2.5,1,12\n30000,3.5,0,\n");
   EXPECT_EQ(Summarize(root_)[0].values, (std::vector<double>{3.5}));
-  for (const char* row : {"10000", "10000,", "10000,1", "10000,1,0", "10000,x,0,", "1e4,1,0,",
+  for (const char* row : {"10000", "10000,", "10000,1", "10000,1,0", "10000,x,0,", "10000.5,1,0,",
                           "10000,1 ,0,", "10000,nan,0,", "10000,inf,0,", "10000,1,0,,"}) {
     WriteFileAtomically(csv, header + row + "\n");
     EXPECT_THROW(Summarize(root_), Error) << row;
