@@ -134,7 +134,10 @@ void Multiply(const Factor& A, const Factor& B, Index m, Index k, Index n, Targe
       const Factor a = A.From(i, q), b = B.From(q, 0);
       const Target c = C.From(i, 0);
       // 12 or 8 sums at once: enough to hide an addition's latency, and no more than registers.
-      if (m - i >= 2 * kLanes) {
+      if (n == 1 && m - i >= 8 * kLanes) {
+        MultiplyStrip<kLanes, 8, 1>(a, b, 8 * kLanes, depth, n, c);
+        i += 8 * kLanes;
+      } else if (m - i >= 2 * kLanes) {
         MultiplyStrip<kLanes, 2, 6>(a, b, 2 * kLanes, depth, n, c);
         i += 2 * kLanes;
       } else if (m - i > kLanes / 2) {
