@@ -15,7 +15,7 @@ from plots.claims import (AUTHORS_PARAMETERS, CLAIMS, FAILS, GRADIENT_BOUND, HOL
                           UNMEASURED, Claim, Evidence, Finding, parameter_counts, verdict_of)
 from plots.records import (FIDELITIES, METHODS, PAIRS, SEEDS, TASKS, Cell, DamagedFile,
                            Key, Rows, load_cells)
-from plots.samples import Sample, Samples, author_samples, our_samples
+from plots.samples import Sample, Samples, author_samples, original_code, our_samples
 from plots.statistics import Moments, bootstrap, improvement, iqm, mean_improvement, welch
 from plots.style import FOLDER, RESULTS, Drawing, inline_svg, save
 from plots.tables import COUNTERS, read_bench, read_interpretations, read_rows, read_switches
@@ -29,6 +29,12 @@ SINGLE_NOTE = (
     "The authors' scripts pick PPO's logs by a name that PPOC's match, too, so that the curve of "
     "PPO in their figures may be the mean of both; here the two are apart. Their logs have no "
     "DAC-OneStep, and IOPG on four tasks.")
+ORIGINAL_NOTE = (
+    "Option2Vec as the authors' code computes it, run on this project's tasks "
+    "(`results/reference/README.md` says which version), beside our `released` and their logs: what "
+    "it shares with ours and not with their logs is no error of ours. Return at one million steps, "
+    "and mean return on the way there, which depends less on where a run happens to end. The "
+    "deviation of the latter in their logs is an upper bound.")
 TRANSFER_NOTE = (
     "OC is the option-critic with four workers; the curve of that name in the authors' figure is "
     "IOPG's. The authors' Option2Vec has embeddings of 20 or 30 dimensions on these pairs. Values "
@@ -61,6 +67,7 @@ def build(results: Path, experiments: Sequence[str] | None = None
         Heading("Claims"), *_claims(evidence),
         Heading("Single tasks"), Paragraph(SINGLE_NOTE), *_comparison(TASKS, sources, cells),
         *drawn(fig_learning_curves),
+        *_original(original_code(results / "reference"), sources),
         Heading("Transfer"), Paragraph(TRANSFER_NOTE), *_comparison(tuple(PAIRS), sources, cells),
         *drawn(fig_transfer),
         Heading("Options"), *drawn(fig_options), *drawn(fig_embedding),
@@ -211,6 +218,21 @@ def _comparison(tasks: Sequence[str], sources: Mapping[str, Samples],
             header += ["first task, ours", "first task, authors"]
         blocks.append(Table(header, rows))
     return blocks
+
+
+def _original(runs: Mapping[str, tuple[Moments, Moments]],
+              sources: Mapping[str, Samples]) -> list[Block]:
+    """Option2Vec by the authors' own code, between ours and their logs."""
+    if not runs:
+        return []
+    rows = []
+    for task, (final, area) in runs.items():
+        ours, logs = (sources[s].get((task, OURS)) for s in ("released", "authors"))
+        rows.append([task, moments(_moments(ours)), moments(final), moments(_moments(logs)),
+                     moments(ours and ours.area), moments(area), moments(logs and logs.area)])
+    return [Heading("The authors' code on our simulator", 3), Paragraph(ORIGINAL_NOTE),
+            Table(["task", "ours, `released`", "their code here", "their logs",
+                   "mean over all steps, ours", "their code here", "their logs"], rows)]
 
 
 def _entry(sample: Sample | None, cell: Cell | None) -> str:

@@ -152,6 +152,23 @@ def author_samples(reference: Path) -> Samples:
             for (task, name), pairs in sorted(ends.items()) if name in ids}
 
 
+def original_code(reference: Path) -> dict[str, tuple[Moments, Moments]]:
+    """By task, of the runs of the authors' own code on our simulator that went to one million
+    steps: the return there, and the mean return of the updates until there."""
+    path = reference / "original_code" / "runs.csv"
+    runs: dict[tuple[str, int], list[tuple[int, float]]] = {}
+    for row in read_table(path, {"env": str, "seed": int, "step": int, "return_20": finite}
+                          | {f"usage_{k}": finite for k in range(4)}) if path.is_file() else ():
+        runs.setdefault((row["env"], row["seed"]), []).append((row["step"], row["return_20"]))
+    returns: dict[str, list[np.ndarray]] = {}
+    for (task, _), points in sorted(runs.items()):
+        if points[-1][0] >= MILLION:
+            returns.setdefault(task, []).append(np.array([r for s, r in points if s <= MILLION]))
+    return {task: (Moments.of(np.array([r[-1] for r in rows])),
+                   Moments.of(np.array([r.mean() for r in rows])))
+            for task, rows in returns.items()}
+
+
 def _of_authors(task: str, ends: np.ndarray, points: np.ndarray) -> Sample:
     horizon = horizon_of(task)
     curve = Curve(points[:, 0], points[:, 1], points[:, 2], int(points[0, 3]))

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from plots.records import DamagedFile, Key, load_cells
-from plots.samples import author_samples, mean_duration, our_samples
+from plots.samples import author_samples, mean_duration, original_code, our_samples
 from plots.tables import read_bench, read_interpretations, read_rows, read_switches
 from tree import ROOT, write_run
 
@@ -168,6 +168,29 @@ class SamplesTest(InFolder):
                   if 0 < int(step) <= 1_000_000]
         area = author_samples(ROOT / "results" / "reference")["Ant-v2", "ppo"].area
         np.testing.assert_allclose((area.mean, area.std, area.n), (*np.mean(points, axis=0), 10))
+
+
+class OriginalCodeTest(InFolder):
+    def write(self, *rows: str) -> Path:
+        folder = self.results / "reference" / "original_code"
+        folder.mkdir(parents=True)
+        header = "env,seed,step,return_20,usage_0,usage_1,usage_2,usage_3"
+        lines = [header, *(f"{row},1,0,0,0" for row in rows)]
+        (folder / "runs.csv").write_text("\n".join(lines) + "\n")
+        return folder.parent
+
+    def test_runs_that_went_to_one_million_steps_count_to_there(self):
+        folder = self.write("A,0,500000,1", "A,0,990000,5", "A,0,1010000,9",
+                            "A,1,1000000,2", "A,2,999999,7", "B,0,500000,3")
+        (task, (final, area)), = original_code(folder).items()
+        self.assertEqual(task, "A")
+        self.assertEqual((final.mean, final.std, final.n), (3.5, 1.5, 2))  # of 5 and 2
+        self.assertEqual((area.mean, area.std, area.n), (2.5, 0.5, 2))  # of 3 and 2
+
+    def test_absent_and_damaged_files(self):
+        self.assertEqual(original_code(self.results), {})
+        folder = self.write("A,0,500000,x")
+        self.refuses("runs.csv:2", lambda _: original_code(folder))
 
 
 class TablesTest(InFolder):
