@@ -16,30 +16,36 @@ namespace {
 
 constexpr Index S = 17, A = 6, K = 4, D = 40, F = 50, h = 64, B = 64;
 
-/// C (m, n) = A (m, k) B (k, n): ours, or a bare Eigen product.
+/// The three products of a layer (k -> m) on n columns, ours or bare Eigen ones: forward, W x;
+/// weight gradient, dy x^T; input gradient, W^T dy.
 void BM_Product(benchmark::State& state) {
-  const Index m = state.range(1), k = state.range(2), n = state.range(3);
-  const Mat a = Mat::Random(m, k), b = Mat::Random(k, n);
-  Mat c(m, n);
+  const Index m = state.range(2), k = state.range(3), n = state.range(4);
+  const Mat W = Mat::Random(m, k), x = Mat::Random(k, n), dy = Mat::Random(m, n);
+  Mat y(m, n), dW(m, k), dx(k, n);
+  const bool ours = state.range(0) != 0;
   for (auto _ : state) {
-    if (state.range(0)) {
-      SetAB(a, b, c);
-    } else {
-      c.noalias() = a * b;
+    switch (state.range(1)) {
+      case 0:
+        ours ? SetAB(W, x, y) : void(y.noalias() = W * x);
+        break;
+      case 1:
+        ours ? SetABt(dy, x, dW) : void(dW.noalias() = dy * x.transpose());
+        break;
+      default:
+        ours ? SetAtB(W, dy, dx) : void(dx.noalias() = W.transpose() * dy);
     }
-    benchmark::DoNotOptimize(c.data());
     benchmark::ClobberMemory();
   }
   const double flop = 2.0 * double(m) * double(k) * double(n) * double(state.iterations());
   state.counters["GFLOP/s"] = benchmark::Counter(flop / 1e9, benchmark::Counter::kIsRate);
 }
 BENCHMARK(BM_Product)
-    ->ArgNames({"ours", "m", "k", "n"})
-    ->ArgsProduct({{0, 1}, {h}, {S}, {B}})
-    ->ArgsProduct({{0, 1}, {h}, {h}, {B}})
-    ->ArgsProduct({{0, 1}, {F}, {D}, {2 * B}})
-    ->ArgsProduct({{0, 1}, {K}, {D}, {2 * B}})
-    ->ArgsProduct({{0, 1}, {D}, {K}, {2 * B}});
+    ->ArgNames({"ours", "form", "m", "k", "n"})
+    ->ArgsProduct({{0, 1}, {0, 1, 2}, {h}, {S}, {B}})
+    ->ArgsProduct({{0, 1}, {0, 1, 2}, {h}, {h}, {1, 4, B}})
+    ->ArgsProduct({{0, 1}, {0, 1, 2}, {F}, {D}, {2 * B}})
+    ->ArgsProduct({{0, 1}, {0, 1, 2}, {K}, {D}, {2 * B}})
+    ->ArgsProduct({{0, 1}, {0, 1, 2}, {D}, {D}, {K}});
 
 void BM_BodyForward(benchmark::State& state) {
   Rng rng(1, "bench");

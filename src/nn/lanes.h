@@ -1,6 +1,6 @@
 #pragma once
-// Loops over short columns, in vector registers: a column has D = 20 to 40 entries, so that block
-// expressions of run-time size would cost more than the arithmetic.
+// Numbers of a vector register, and loops with them over short columns: one has D = 20 to 40
+// entries, so that block expressions of run-time size would cost more than the arithmetic.
 
 #include <type_traits>
 

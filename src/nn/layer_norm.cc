@@ -15,6 +15,8 @@ constexpr Real kEps = Real(1e-5);  // spec 2.1
 void LayerNorm::Forward(const ConstMatRef& x, Cache& cache, MatRef y) const {
   Check(x.rows() == gain.value.rows(), gain.name, ": got ", x.rows(), " rows, not ",
         gain.value.rows());
+  Check(y.rows() == x.rows() && y.cols() == x.cols(), gain.name, ": got y (", y.rows(), ", ",
+        y.cols(), ") for x (", x.rows(), ", ", x.cols(), ")");
   const Index n = x.rows(), B = x.cols();
   cache.x_hat.resize(n, B);
   cache.inv_std.resize(B);
@@ -41,6 +43,8 @@ void LayerNorm::Forward(const ConstMatRef& x, Cache& cache, MatRef y) const {
 
 void LayerNorm::Backward(const Cache& cache, const ConstMatRef& dy, MatRef dx) {
   AddGrad(cache, dy);
+  Check(dx.rows() == dy.rows() && dx.cols() == dy.cols(), gain.name, ": got dx (", dx.rows(), ", ",
+        dx.cols(), ") for dy (", dy.rows(), ", ", dy.cols(), ")");
   const Index n = dy.rows();
   const Real n_inv = Real(1) / static_cast<Real>(n);
   const Real* g = gain.value.data();
@@ -65,6 +69,8 @@ void LayerNorm::Backward(const Cache& cache, const ConstMatRef& dy, MatRef dx) {
 }
 
 void LayerNorm::AddGrad(const Cache& cache, const ConstMatRef& dy) {
+  Check(dy.rows() == cache.x_hat.rows() && dy.cols() <= cache.x_hat.cols(), gain.name, ": got dy (",
+        dy.rows(), ", ", dy.cols(), ") for x (", cache.x_hat.rows(), ", ", cache.x_hat.cols(), ")");
   const Index n = dy.rows();
   Real* dgain = gain.grad.data();
   Real* dshift = shift.grad.data();

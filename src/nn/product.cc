@@ -7,19 +7,20 @@
 
 // Eigen's own product copies both factors into panels, for matrices far beyond the caches. Ours fit
 // into the first ones, and many are but a few rows or columns thin (K options, A actions): copying
-// would cost more than multiplying. Here 16, 8 or 4 rows of A, a strip, pass over all of B, and
-// only a strip whose rows lie apart is copied (BM_Product compares).
+// would cost more than multiplying. Here a strip of A, a few registers high, passes over all of B;
+// it is copied where its rows lie apart or fill no register. Speed hangs on how the compiler
+// inlines what follows: after a change look at all of BM_Product.
 //
-// Every entry of C is one sum over k in rising order, by blocks of kDepth, whatever its place, the
-// width of the batch or the size of the machine's caches.
+// An entry of C is, a block of kDepth, one sum over k in rising order, and the blocks are added in
+// order: whatever its place, the width of the batch or the size of the machine's caches.
 
 namespace o2v {
 namespace {
 
 constexpr int kLanes = 32 / sizeof(Real);  // of an AVX2 register
-constexpr Index kDepth = 128;              // columns of a strip: 8 kB, of the first cache's 32
+constexpr Index kDepth = 128;              // 16 floats high: 8 kB of the first cache's 32
 
-/// A factor or its transpose: entry (i, j) is data[i row + j col].
+/// A factor: entry (i, j) is data[i row + j col].
 struct Factor {
   const Real* data;
   Index row, col;
@@ -27,8 +28,6 @@ struct Factor {
   Factor From(Index i, Index j) const { return {data + i * row + j * col, row, col}; }
   Factor Transposed() const { return {data, col, row}; }
 };
-Factor Plain(const ConstMatRef& X) { return {X.data(), 1, X.outerStride()}; }
-Factor Transposed(const ConstMatRef& X) { return Plain(X).Transposed(); }
 
 /// The product, likewise; added to what is there, or put in its place.
 struct Target {
@@ -45,7 +44,7 @@ struct Strip {
   Index col;
 };
 
-/// C (rows, kCols) (+)= strip B (k, kCols), of the strip the first rows. The sums stay in
+/// C (rows, kCols) (+)= strip B (k, kCols), of the strip's first `rows` rows. The sums stay in
 /// registers.
 template <int kN, int kRegs, int kCols>
 void MultiplyTile(Strip strip, const Factor& B, Index rows, Index k, const Target& C) {
@@ -101,7 +100,9 @@ template <int kN, int kRegs, int kCols>
 void MultiplyStrip(const Factor& A, const Factor& B, Index rows, Index k, Index n,
                    const Target& C) {
   constexpr Index kHeight = kN * kRegs;
-  if (A.row == 1 && rows == kHeight) {
+  // Half registers are copied always: with known steps in the strip the steps in B fit in
+  // registers.
+  if (kN == kLanes && A.row == 1 && rows == kHeight) {
     MultiplyColumns<kN, kRegs, kCols>({A.data, A.col}, B, rows, k, n, C);
     return;
   }
@@ -122,7 +123,7 @@ void MultiplyStrip(const Factor& A, const Factor& B, Index rows, Index k, Index 
 
 /// C (m, n) (+)= A (m, k) B (k, n).
 void Multiply(const Factor& A, const Factor& B, Index m, Index k, Index n, Target C) {
-  // C^T = B^T A^T where A is thin and B^T needs no copy, or where both do and B^T is the smaller.
+  // C^T = B^T A^T where neither needs a copy and A is thin, or where both do and B is the smaller.
   const bool copy_A = A.row != 1, copy_B = B.col != 1;
   if (copy_B ? copy_A && n < m : !copy_A && m <= kLanes && m < n) {
     Multiply(B.Transposed(), A.Transposed(), n, k, m, {C.data, C.col, C.row, C.add});
@@ -133,7 +134,8 @@ void Multiply(const Factor& A, const Factor& B, Index m, Index k, Index n, Targe
     for (Index i = 0; i < m;) {
       const Factor a = A.From(i, q), b = B.From(q, 0);
       const Target c = C.From(i, 0);
-      // 12 or 8 sums at once: enough to hide an addition's latency, and no more than registers.
+      // 12 or 8 sums at once: enough to hide an addition's latency, no more than there are
+      // registers.
       if (n == 1 && m - i >= 8 * kLanes) {
         MultiplyStrip<kLanes, 8, 1>(a, b, 8 * kLanes, depth, n, c);
         i += 8 * kLanes;
@@ -151,45 +153,41 @@ void Multiply(const Factor& A, const Factor& B, Index m, Index k, Index n, Targe
   }
 }
 
-void CheckShapes(Index m, Index k, Index k2, Index n, const MatRef& C) {
-  Check(k == k2 && C.rows() == m && C.cols() == n, "product: (", m, ", ", k, ") times (", k2, ", ",
-        n, ") into (", C.rows(), ", ", C.cols(), ")");
+struct Operand {
+  Factor entries;
+  Index rows, cols;
+};
+Operand Plain(const ConstMatRef& X) { return {{X.data(), 1, X.outerStride()}, X.rows(), X.cols()}; }
+Operand Transposed(const ConstMatRef& X) {
+  return {{X.data(), X.outerStride(), 1}, X.cols(), X.rows()};
+}
+
+/// C (+)= A B.
+void Product(const Operand& A, const Operand& B, MatRef& C, bool add) {
+  Check(A.cols == B.rows && C.rows() == A.rows && C.cols() == B.cols, "product: (", A.rows, ", ",
+        A.cols, ") times (", B.rows, ", ", B.cols, ") into (", C.rows(), ", ", C.cols(), ")");
+  Multiply(A.entries, B.entries, A.rows, A.cols, B.cols, {C.data(), 1, C.outerStride(), add});
 }
 
 }  // namespace
 
 void SetAB(const ConstMatRef& A, const ConstMatRef& B, MatRef C) {
-  CheckShapes(A.rows(), A.cols(), B.rows(), B.cols(), C);
-  Multiply(Plain(A), Plain(B), A.rows(), A.cols(), B.cols(), {C.data(), 1, C.outerStride(), false});
+  Product(Plain(A), Plain(B), C, false);
 }
-
 void AddAB(const ConstMatRef& A, const ConstMatRef& B, MatRef C) {
-  CheckShapes(A.rows(), A.cols(), B.rows(), B.cols(), C);
-  Multiply(Plain(A), Plain(B), A.rows(), A.cols(), B.cols(), {C.data(), 1, C.outerStride(), true});
+  Product(Plain(A), Plain(B), C, true);
 }
-
 void SetABt(const ConstMatRef& A, const ConstMatRef& B, MatRef C) {
-  CheckShapes(A.rows(), A.cols(), B.cols(), B.rows(), C);
-  Multiply(Plain(A), Transposed(B), A.rows(), A.cols(), B.rows(),
-           {C.data(), 1, C.outerStride(), false});
+  Product(Plain(A), Transposed(B), C, false);
 }
-
 void AddABt(const ConstMatRef& A, const ConstMatRef& B, MatRef C) {
-  CheckShapes(A.rows(), A.cols(), B.cols(), B.rows(), C);
-  Multiply(Plain(A), Transposed(B), A.rows(), A.cols(), B.rows(),
-           {C.data(), 1, C.outerStride(), true});
+  Product(Plain(A), Transposed(B), C, true);
 }
-
 void SetAtB(const ConstMatRef& A, const ConstMatRef& B, MatRef C) {
-  CheckShapes(A.cols(), A.rows(), B.rows(), B.cols(), C);
-  Multiply(Transposed(A), Plain(B), A.cols(), A.rows(), B.cols(),
-           {C.data(), 1, C.outerStride(), false});
+  Product(Transposed(A), Plain(B), C, false);
 }
-
 void AddAtB(const ConstMatRef& A, const ConstMatRef& B, MatRef C) {
-  CheckShapes(A.cols(), A.rows(), B.rows(), B.cols(), C);
-  Multiply(Transposed(A), Plain(B), A.cols(), A.rows(), B.cols(),
-           {C.data(), 1, C.outerStride(), true});
+  Product(Transposed(A), Plain(B), C, true);
 }
 
 }  // namespace o2v

@@ -1,5 +1,5 @@
 #pragma once
-// Matrix products, all in one place: the layers' cost, and Eigen's kernels compiled once.
+// Matrix products of small matrices, most of what learning costs.
 
 #include "base/types.h"
 

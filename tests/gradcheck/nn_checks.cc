@@ -109,13 +109,15 @@ Comparison CheckBody(Activation g) {
   return Compare(slots, rng);
 }
 
+/// n = 29: pieces of 8, 4 and 1 lanes; 15: nothing beyond the last.
+template <int n>
 Comparison CheckLayerNorm() {
   Rng rng(5, "gradcheck.layer_norm");
-  LayerNorm norm("norm", 6);
+  LayerNorm norm("norm", n);
   Randomize(norm.Params(), rng);
   LayerNorm::Cache cache;
-  Mat x = RandomMat(6, kB, rng), y(6, kB), dx(6, kB);
-  const Mat dy = RandomMat(6, kB, rng);
+  Mat x = RandomMat(n, kB, rng), y(n, kB), dx(n, kB);
+  const Mat dy = RandomMat(n, kB, rng);
   const auto loss = [&] {
     norm.Forward(x, cache, y);
     return y.cwiseProduct(dy).sum();
@@ -233,7 +235,9 @@ std::vector<NamedCheck> NnChecks() {
       {"sigmoid", [] { return CheckElementwise(Sigmoid, SigmoidBackward); }},
       {"body tanh", [] { return CheckBody(Activation::kTanh); }},
       {"body relu", [] { return CheckBody(Activation::kRelu); }},
-      {"layer_norm", CheckLayerNorm},
+      {"layer_norm", CheckLayerNorm<6>},
+      {"layer_norm.15", CheckLayerNorm<15>},
+      {"layer_norm.29", CheckLayerNorm<29>},
       {"embedding", CheckEmbedding},
       {"embedded_linear", CheckEmbeddedLinear},
   };

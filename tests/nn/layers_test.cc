@@ -61,19 +61,52 @@ TEST(LayerNorm, OfAConstantColumnIsItsShift) {
   EXPECT_TRUE(y.isZero());
 }
 
+TEST(LayerNorm, EqualsTheTextbookAtEveryLength) {
+  Rng rng(3, "test");
+  for (Index n = 1; n <= 50; ++n) {
+    LayerNorm norm("norm", n);
+    norm.gain.value = RandomMat(n, 1, rng);
+    norm.shift.value = RandomMat(n, 1, rng);
+    LayerNorm::Cache cache;
+    const Mat x = RandomMat(n, 2, rng);
+    Mat y(n, 2);
+    norm.Forward(x, cache, y);
+    for (Index b = 0; b < 2; ++b) {
+      const VecD centred = x.col(b).cast<double>().array() - x.col(b).cast<double>().mean();
+      const double std = std::sqrt(centred.array().square().mean() + 1e-5);
+      for (Index i = 0; i < n; ++i) {
+        EXPECT_NEAR(y(i, b), norm.gain.value(i) * centred(i) / std + norm.shift.value(i), 1e-5)
+            << "entry " << i << " of " << n;
+      }
+    }
+  }
+}
+
 TEST(LayerNorm, MayWorkInPlace) {
+  constexpr Index kN = 29;
   Rng rng(1, "test");
-  LayerNorm norm("norm", 4);
-  norm.gain.value = RandomMat(4, 1, rng);
+  LayerNorm norm("norm", kN);
+  norm.gain.value = RandomMat(kN, 1, rng);
   LayerNorm::Cache cache;
-  const Mat x = RandomMat(4, 3, rng), dy = RandomMat(4, 3, rng);
-  Mat y(4, 3), dx(4, 3), x_in_place = x, dy_in_place = dy;
+  const Mat x = RandomMat(kN, 3, rng), dy = RandomMat(kN, 3, rng);
+  Mat y(kN, 3), dx(kN, 3), x_in_place = x, dy_in_place = dy;
   norm.Forward(x, cache, y);
   norm.Backward(cache, dy, dx);
   norm.Forward(x_in_place, cache, x_in_place);
   norm.Backward(cache, dy_in_place, dy_in_place);
   EXPECT_EQ(x_in_place, y);
   EXPECT_EQ(dy_in_place, dx);
+}
+
+TEST(LayerNorm, RefusesShapesThatDoNotFit) {
+  LayerNorm norm("norm", 4);
+  LayerNorm::Cache cache;
+  Mat y(4, 2), dx(4, 2);
+  EXPECT_THROW(norm.Forward(Mat::Zero(5, 2), cache, y), Error);
+  EXPECT_THROW(norm.Forward(Mat::Zero(4, 3), cache, y), Error);
+  norm.Forward(Mat::Zero(4, 2), cache, y);
+  EXPECT_THROW(norm.Backward(cache, Mat::Zero(4, 3), dx), Error);
+  EXPECT_THROW(norm.Backward(cache, Mat::Zero(4, 1), dx), Error);
 }
 
 TEST(Dropout, DropsAtItsRateAndScalesTheRest) {

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <random>
 
 #include "base/check.h"
@@ -13,8 +14,9 @@ namespace {
 
 using Form = void (*)(const ConstMatRef&, const ConstMatRef&, MatRef);
 
-/// Strips of 16, 8 and 4 rows, tiles of 1 to 8 columns, and what is left of each.
-constexpr Index kSizes[] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 12, 15, 16, 17, 20, 24, 25, 30, 33, 50, 64};
+/// Strips of 8, 2, 1 and half a register, tiles of 1 to 8 columns, and what is left of each.
+constexpr Index kSizes[] = {1,  2,  3,  4,  5,  6,  7,  8,  9,  12, 15,
+                            16, 17, 20, 24, 25, 30, 33, 50, 64, 70, 130};
 constexpr Index kDepths[] = {0, 1, 2, 3, 4, 17, 40, 127, 128, 129, 300};
 
 class Products : public testing::Test {
@@ -25,7 +27,7 @@ class Products : public testing::Test {
   }
 
   /// A and B lie in larger matrices, and so does C, of which nothing else may change.
-  void Check(Form form, bool A_transposed, bool B_transposed, bool add) {
+  void Compare(Form form, bool A_transposed, bool B_transposed, bool add) {
     for (const Index m : kSizes) {
       for (const Index n : kSizes) {
         for (const Index k : kDepths) {
@@ -38,6 +40,7 @@ class Products : public testing::Test {
           if (!add) c.setZero();
           c += (A_transposed ? Mat(a.transpose()) : Mat(a)) *
                (B_transposed ? Mat(b.transpose()) : Mat(b));
+          if (!add) C.block(1, 1, m, n).setConstant(std::numeric_limits<Real>::quiet_NaN());
           form(a, b, C.block(1, 1, m, n));
           ASSERT_EQ(C, expected) << "(" << m << ", " << k << ") times (" << k << ", " << n << ")";
         }
@@ -49,20 +52,32 @@ class Products : public testing::Test {
   std::mt19937 rng_{1};
 };
 
-TEST_F(Products, SetABOverwrites) { Check(SetAB, false, false, false); }
-TEST_F(Products, AddABAdds) { Check(AddAB, false, false, true); }
-TEST_F(Products, SetABtOverwrites) { Check(SetABt, false, true, false); }
-TEST_F(Products, AddABtAdds) { Check(AddABt, false, true, true); }
-TEST_F(Products, SetAtBOverwrites) { Check(SetAtB, true, false, false); }
-TEST_F(Products, AddAtBAdds) { Check(AddAtB, true, false, true); }
+TEST_F(Products, SetABOverwrites) { Compare(SetAB, false, false, false); }
+TEST_F(Products, AddABAdds) { Compare(AddAB, false, false, true); }
+TEST_F(Products, SetABtOverwrites) { Compare(SetABt, false, true, false); }
+TEST_F(Products, AddABtAdds) { Compare(AddABt, false, true, true); }
+TEST_F(Products, SetAtBOverwrites) { Compare(SetAtB, true, false, false); }
+TEST_F(Products, AddAtBAdds) { Compare(AddAtB, true, false, true); }
 
-TEST_F(Products, ASampleDoesNotDependOnTheOthersInItsBatch) {
-  const Mat W = Mat::Random(50, 200), X = Mat::Random(200, 64);
-  Mat Y(50, 64), y(50, 1);
-  SetAB(W, X, Y);
-  for (Index j = 0; j < X.cols(); ++j) {
-    SetAB(W, X.col(j), y);
-    ASSERT_EQ(y, Y.col(j)) << "sample " << j;
+TEST_F(Products, AnEntryDependsOnItsRowAndColumnAlone) {
+  constexpr Index kLargest = 130;
+  for (const Index k : kDepths) {
+    const Mat A = Mat::Random(kLargest, k), B = Mat::Random(k, kLargest);
+    const Mat A_t = A.transpose(), B_t = B.transpose();
+    Mat whole(kLargest, kLargest);
+    SetAB(A, B, whole);
+    for (const Index m : kSizes) {
+      for (const Index n : kSizes) {
+        const auto expected = whole.bottomRightCorner(m, n);
+        Mat C(m, n);
+        SetAB(A.bottomRows(m), B.rightCols(n), C);
+        ASSERT_EQ(C, expected) << "(" << m << ", " << k << ") times (" << k << ", " << n << ")";
+        SetABt(A.bottomRows(m), B_t.bottomRows(n), C);
+        ASSERT_EQ(C, expected) << "(" << m << ", " << k << ") times (" << k << ", " << n << ")";
+        SetAtB(A_t.rightCols(m), B.rightCols(n), C);
+        ASSERT_EQ(C, expected) << "(" << m << ", " << k << ") times (" << k << ", " << n << ")";
+      }
+    }
   }
 }
 
