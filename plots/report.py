@@ -32,7 +32,7 @@ SINGLE_NOTE = (
 ORIGINAL_NOTE = (
     "Option2Vec as the authors' code computes it, run on this project's tasks "
     "(`results/reference/README.md` says which version), beside our `released` and their logs: what "
-    "it shares with ours and not with their logs is no error of ours. Return at one million steps, "
+    "it shares with ours and not with their logs speaks against an error of ours. Return at one million steps, "
     "and mean return on the way there, which depends less on where a run happens to end. The "
     "deviation of the latter in their logs is an upper bound.")
 TRANSFER_NOTE = (

@@ -107,8 +107,9 @@ CsvTable ReadCsv(const std::filesystem::path& path, CsvGaps gaps) {
                                                         : ReadNumber(cell, table, row, column));
     }
   }
-  if (table.values.empty() && !gaps.rows)
+  if (table.values.empty() && !gaps.rows) {
     throw ConfigError(table.path + ": no rows after the header");
+  }
   return table;
 }
 

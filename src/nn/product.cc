@@ -153,6 +153,7 @@ void Multiply(const Factor& A, const Factor& B, Index m, Index k, Index n, Targe
   }
 }
 
+/// A matrix (rows, cols) or its transpose.
 struct Operand {
   Factor entries;
   Index rows, cols;
