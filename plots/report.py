@@ -16,7 +16,8 @@ from plots.claims import (AUTHORS_PARAMETERS, CLAIMS, FAILS, GRADIENT_BOUND, HOL
 from plots.records import (FIDELITIES, METHODS, PAIRS, SEEDS, TASKS, Cell, DamagedFile,
                            Key, Rows, load_cells)
 from plots.samples import Sample, Samples, author_samples, original_code, our_samples
-from plots.statistics import Moments, bootstrap, improvement, iqm, mean_improvement, welch
+from plots.statistics import (Moments, bootstrap, improvement, iqm, mean_improvement, one_sample,
+                              welch)
 from plots.style import FOLDER, RESULTS, Drawing, inline_svg, save
 from plots.tables import COUNTERS, read_bench, read_interpretations, read_rows, read_switches
 from plots.text import (Block, Heading, Items, Paragraph, Picture, Table, interval, moments, number,
@@ -32,9 +33,9 @@ SINGLE_NOTE = (
 ORIGINAL_NOTE = (
     "Option2Vec as the authors' code computes it, run on this project's tasks "
     "(`results/reference/README.md` says which version), beside our `released` and their logs: what "
-    "it shares with ours and not with their logs speaks against an error of ours. Return at one million steps, "
-    "and mean return on the way there, which depends less on where a run happens to end. The "
-    "deviation of the latter in their logs is an upper bound.")
+    "it shares with ours and not with their logs speaks against an error of ours. Return at one "
+    "million steps, and mean return on the way there, which depends less on where a run happens to "
+    "end. The deviation of the latter in their logs is an upper bound.")
 TRANSFER_NOTE = (
     "OC is the option-critic with four workers; the curve of that name in the authors' figure is "
     "IOPG's. The authors' Option2Vec has embeddings of 20 or 30 dimensions on these pairs. Values "
@@ -384,7 +385,8 @@ def _deviations(switches: Rows, cells: Mapping[Key, Cell]) -> list[Block]:
     return [Paragraph("Every difference between the paper and the released code in what is computed "
                       "is a switch; differences in sizes are in the second table. Runs: "
                       "the values in the records, with their number. Effect: return with the "
-                      "switch turned less that without, other switches as the fidelity has them."),
+                      "switch turned less that of the same seed without, other switches as the "
+                      "fidelity has them (Student's t of the pairs)."),
             Table(["switch", "methods", "the paper", "the released code", "other values",
                    "our `paper` runs", "our `released` runs", "measured effect"], rows),
             *_sizes(cells)]
@@ -424,13 +426,17 @@ def _effects(switch: str, cells: Mapping[Key, Cell]) -> list[str]:
         name, _, value = key.variant.partition("=")
         if name != switch:
             continue
-        turned = our_samples(cells, key.fidelity, key.variant).get((key.task, key.algorithm))
-        base = our_samples(cells, key.fidelity).get((key.task, key.algorithm))
-        if turned is not None and base is not None and turned.step == base.step:
-            d = welch(turned.moments, base.moments)
+        turned, base = cells[key], cells.get(key._replace(variant=""))
+        if base is None or turned.wanted != base.wanted:
+            continue
+        # A seed's two runs are the same up to the switch's first effect.
+        without = {run.seed: run.ret[-1] for run in base.whole}
+        gains = [run.ret[-1] - without[run.seed] for run in turned.whole if run.seed in without]
+        if gains:
+            d = one_sample(Moments.of(gains))
             texts.append(f"{key.fidelity} with {value}, {key.task}, {METHODS[key.algorithm]}: "
                          f"{number(d.mean, '+')} {interval(d.interval, '+')}, {p_clause(d.p)} "
-                         f"(n = {turned.moments.n}, {base.moments.n})")
+                         f"(n = {len(gains)})")
     return texts
 
 

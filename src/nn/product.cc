@@ -20,28 +20,32 @@ namespace {
 constexpr int kLanes = 32 / sizeof(Real);  // of an AVX2 register
 constexpr Index kDepth = 128;              // 16 floats high: 8 kB of the first cache's 32
 
-/// A factor: entry (i, j) is data[i row + j col].
+/// A factor: entry (i, j) is data[i row_step + j col_step].
 struct Factor {
   const Real* data;
-  Index row, col;
+  Index row_step, col_step;
 
-  Factor From(Index i, Index j) const { return {data + i * row + j * col, row, col}; }
-  Factor Transposed() const { return {data, col, row}; }
+  Factor From(Index i, Index j) const {
+    return {data + i * row_step + j * col_step, row_step, col_step};
+  }
+  Factor Transposed() const { return {data, col_step, row_step}; }
 };
 
 /// The product, likewise; added to what is there, or put in its place.
 struct Target {
   Real* data;
-  Index row, col;
+  Index row_step, col_step;
   bool add;
 
-  Target From(Index i, Index j) const { return {data + i * row + j * col, row, col, add}; }
+  Target From(Index i, Index j) const {
+    return {data + i * row_step + j * col_step, row_step, col_step, add};
+  }
 };
 
-/// Rows of A whose entries lie together, the columns `col` apart: (kN kRegs, k).
+/// Rows of A whose entries lie together, the columns `col_step` apart: (kN kRegs, k).
 struct Strip {
   const Real* data;
-  Index col;
+  Index col_step;
 };
 
 /// C (rows, kCols) (+)= strip B (k, kCols), of the strip's first `rows` rows. The sums stay in
@@ -53,18 +57,18 @@ void MultiplyTile(Strip strip, const Factor& B, Index rows, Index k, const Targe
   for (int j = 0; j < kCols; ++j) {
     for (int r = 0; r < kRegs; ++r) sum[j][r].setZero();
   }
-  for (Index q = 0; q < k; ++q, strip.data += strip.col) {
+  for (Index q = 0; q < k; ++q, strip.data += strip.col_step) {
     Lanes<kN> a[kRegs];
     for (int r = 0; r < kRegs; ++r) a[r] = At<kN>(strip.data + r * kN);
     for (int j = 0; j < kCols; ++j) {
-      const Real b = B.data[q * B.row + j * B.col];
+      const Real b = B.data[q * B.row_step + j * B.col_step];
       for (int r = 0; r < kRegs; ++r) sum[j][r] += a[r] * b;
     }
   }
-  if (rows == kHeight && C.row == 1) {
+  if (rows == kHeight && C.row_step == 1) {
     for (int j = 0; j < kCols; ++j) {
       for (int r = 0; r < kRegs; ++r) {
-        auto c = At<kN>(C.data + j * C.col + r * kN);
+        auto c = At<kN>(C.data + j * C.col_step + r * kN);
         c = C.add ? Lanes<kN>(c + sum[j][r]) : sum[j][r];
       }
     }
@@ -76,7 +80,7 @@ void MultiplyTile(Strip strip, const Factor& B, Index rows, Index k, const Targe
   }
   for (int j = 0; j < kCols; ++j) {
     for (Index i = 0; i < rows; ++i) {
-      Real& c = C.data[i * C.row + j * C.col];
+      Real& c = C.data[i * C.row_step + j * C.col_step];
       c = C.add ? c + out[j * kHeight + i] : out[j * kHeight + i];
     }
   }
@@ -102,19 +106,19 @@ void MultiplyStrip(const Factor& A, const Factor& B, Index rows, Index k, Index 
   constexpr Index kHeight = kN * kRegs;
   // Half registers are copied always: with known steps in the strip the steps in B fit in
   // registers.
-  if (kN == kLanes && A.row == 1 && rows == kHeight) {
-    MultiplyColumns<kN, kRegs, kCols>({A.data, A.col}, B, rows, k, n, C);
+  if (kN == kLanes && A.row_step == 1 && rows == kHeight) {
+    MultiplyColumns<kN, kRegs, kCols>({A.data, A.col_step}, B, rows, k, n, C);
     return;
   }
   alignas(32) Real copy[kHeight * kDepth];
-  if (A.col == 1 && rows == kHeight) {
+  if (A.col_step == 1 && rows == kHeight) {
     using Columns = Eigen::Matrix<Real, Eigen::Dynamic, kHeight>;
-    const Eigen::Map<const Columns, 0, Eigen::OuterStride<>> from(A.data, k, kHeight, {A.row});
+    const Eigen::Map<const Columns, 0, Eigen::OuterStride<>> from(A.data, k, kHeight, {A.row_step});
     Eigen::Map<Eigen::Matrix<Real, kHeight, Eigen::Dynamic>>(copy, kHeight, k) = from.transpose();
   } else {
     for (Index q = 0; q < k; ++q) {
       for (Index i = 0; i < kHeight; ++i) {
-        copy[q * kHeight + i] = i < rows ? A.data[i * A.row + q * A.col] : Real(0);
+        copy[q * kHeight + i] = i < rows ? A.data[i * A.row_step + q * A.col_step] : Real(0);
       }
     }
   }
@@ -124,9 +128,9 @@ void MultiplyStrip(const Factor& A, const Factor& B, Index rows, Index k, Index 
 /// C (m, n) (+)= A (m, k) B (k, n).
 void Multiply(const Factor& A, const Factor& B, Index m, Index k, Index n, Target C) {
   // C^T = B^T A^T where neither needs a copy and A is thin, or where both do and B is the smaller.
-  const bool copy_A = A.row != 1, copy_B = B.col != 1;
+  const bool copy_A = A.row_step != 1, copy_B = B.col_step != 1;
   if (copy_B ? copy_A && n < m : !copy_A && m <= kLanes && m < n) {
-    Multiply(B.Transposed(), A.Transposed(), n, k, m, {C.data, C.col, C.row, C.add});
+    Multiply(B.Transposed(), A.Transposed(), n, k, m, {C.data, C.col_step, C.row_step, C.add});
     return;
   }
   for (Index q = 0; q == 0 || q < k; q += kDepth, C.add = true) {

@@ -49,7 +49,7 @@ class ReportTest(unittest.TestCase):
         write_flat(results, "Cheetah", "ppo", [7, 8], settings="hidden = 64\nworkers = 1")
         write_flat(results, "Cheetah", "ppo", [7, 8], settings="hidden = 128\nworkers = 1",
                    fidelity="released", experiment="transfer")
-        write_flat(results, "HalfCheetah-v2", "ppo", [55, 65, 75], experiment="ablation",
+        write_flat(results, "HalfCheetah-v2", "ppo", [55, 65, 76, 1, 1], experiment="ablation",
                    fidelity="paper-timelimit=released")
         (results / "switches.txt").write_text(
             "switch     paper  released  takes            methods  effect\n"
@@ -102,9 +102,12 @@ class ReportTest(unittest.TestCase):
         self.assertEqual(released[-2], "7.500 ± 0.500 (2)")
 
     def test_the_ablations_effect_is_in_the_deviations(self):
+        # Without seeds 3 (diverged) and 4 (not run): differences 5, 5, 6 have the mean 5.333 with
+        # an error of 1/3, t = 16 with 2 degrees of freedom; half the interval is 4.303 / 3.
         row = self.row("timelimit")
         self.assertEqual(row[2:4], ["bootstrap", "terminal"])
-        self.assertIn("HalfCheetah-v2, PPO: +5.000 [", row[-1])
+        self.assertEqual(row[-1], "paper with released, HalfCheetah-v2, PPO: "
+                                  "+5.333 [+3.899, +6.768], p = 0.0039 (n = 3)")
         self.assertEqual(row[-3], "paper (12)")  # without the one of an older revision
 
     def test_the_ledger_judges_three_sources(self):
