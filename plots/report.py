@@ -16,8 +16,8 @@ from plots.claims import (AUTHORS_PARAMETERS, CLAIMS, FAILS, GRADIENT_BOUND, HOL
 from plots.records import (FIDELITIES, METHODS, PAIRS, SEEDS, TASKS, Cell, DamagedFile,
                            Key, Rows, load_cells)
 from plots.samples import Sample, Samples, author_samples, original_code, our_samples
-from plots.statistics import (Moments, bootstrap, improvement, iqm, mean_improvement, one_sample,
-                              welch)
+from plots.statistics import (CONFIDENCE, Moments, bootstrap, holm, improvement, iqm,
+                              mean_improvement, one_sample, welch)
 from plots.style import FOLDER, RESULTS, Drawing, inline_svg, save
 from plots.tables import COUNTERS, read_bench, read_interpretations, read_rows, read_switches
 from plots.text import (Block, Heading, Items, Paragraph, Picture, Table, interval, moments, number,
@@ -213,12 +213,42 @@ def _comparison(tasks: Sequence[str], sources: Mapping[str, Samples],
         if not rows:
             blocks.append(Paragraph("No runs yet."))
             continue
+        if fidelity == "released":
+            blocks += _agreement(tasks, sources[fidelity], sources["authors"])
         header = ["task", "method", "ours", "IQM [95 %]", "authors", "p, ours = authors",
                   "P(Option2Vec > method) [95 %]", "Option2Vec - method [95 %]", "p", "remarks"]
         if tasks[0] in PAIRS:
             header += ["first task, ours", "first task, authors"]
         blocks.append(Table(header, rows))
     return blocks
+
+
+def _agreement(tasks: Sequence[str], ours: Samples, authors: Samples) -> list[Block]:
+    """How often our returns differ from the authors', beside how often chance would have it."""
+    p: dict[str, float] = {}
+    for task in tasks:
+        for method, name in METHODS.items():
+            sample, published = ours.get((task, method)), authors.get((task, method))
+            if sample is None or published is None or sample.shortened:
+                continue
+            end = welch(sample.moments, published.moments).p
+            if task in PAIRS:
+                first = welch(Moments.of(sample.first), Moments.of(published.first)).p
+                p |= {f"{name} on {task}'s first task": first, f"{name} on {task}'s second task": end}
+            else:
+                p[f"{name} on {task}"] = end
+    p = {what: value for what, value in p.items() if not math.isnan(value)}
+    if not p:
+        return []
+    level = 1 - CONFIDENCE
+    below = sum(value < level for value in p.values())
+    left = [what for what, value in zip(p, holm(list(p.values()))) if value < level]
+    return [Paragraph(
+        f"Ours against the authors', Welch's test: of {len(p)} comparisons {below or 'none'} "
+        f"{'has' if below < 2 else 'have'} p < {level:.2f}; were there no difference at all, "
+        f"{number(level * len(p))} would be expected. With Holm's correction for their number "
+        f"{len(left) or 'none'} {'is' if len(left) < 2 else 'are'} left"
+        f"{': ' if left else ''}{', '.join(left)}.")]
 
 
 def _original(runs: Mapping[str, tuple[Moments, Moments]],

@@ -4,8 +4,8 @@ import unittest
 import numpy as np
 from scipy import stats
 
-from plots.statistics import (Moments, bootstrap, improvement, iqm, mean_improvement, one_sample,
-                              seeds_needed, welch)
+from plots.statistics import (Moments, bootstrap, holm, improvement, iqm, mean_improvement,
+                              one_sample, seeds_needed, welch)
 
 
 class MomentsTest(unittest.TestCase):
@@ -46,6 +46,15 @@ class ImprovementTest(unittest.TestCase):
     def test_of_tasks_is_the_mean_over_tasks(self):
         value = mean_improvement(np.array([1]), np.array([0]), np.array([0]), np.array([0, 1]))
         self.assertAlmostEqual(float(value), (1 + 0.25) / 2)
+
+
+class HolmTest(unittest.TestCase):
+    def test_worked_example(self):
+        # Sorted 0.01, 0.02, 0.02, 0.6 times 4, 3, 2, 1: 0.04, 0.06, 0.04 (not below 0.06), 0.6.
+        np.testing.assert_allclose(holm([0.6, 0.02, 0.01, 0.02]), [0.6, 0.06, 0.04, 0.06])
+
+    def test_is_at_most_one(self):
+        np.testing.assert_array_equal(holm([0.7, 0.9]), [1, 1])
 
 
 class WelchTest(unittest.TestCase):
