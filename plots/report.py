@@ -459,7 +459,7 @@ def _effects(switch: str, cells: Mapping[Key, Cell]) -> list[str]:
         turned, base = cells[key], cells.get(key._replace(variant=""))
         if base is None or turned.wanted != base.wanted:
             continue
-        # A seed's two runs are the same up to the switch's first effect.
+        # A seed's two runs share initial weights and random streams.
         without = {run.seed: run.ret[-1] for run in base.whole}
         gains = [run.ret[-1] - without[run.seed] for run in turned.whole if run.seed in without]
         if gains:

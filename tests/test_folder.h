@@ -14,7 +14,7 @@ namespace o2v {
 class TestFolder {
  public:
   TestFolder() {
-    std::string name = std::filesystem::temp_directory_path() / ("o2v-" + std::string(6, 'X'));
+    std::string name = std::filesystem::temp_directory_path() / "o2v-XXXXXX";
     Check(::mkdtemp(name.data()) != nullptr, name, ": cannot be made");
     path_ = name;
   }
