@@ -1,5 +1,6 @@
 #include "dist/categorical.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "base/check.h"
@@ -9,10 +10,26 @@ namespace o2v {
 void LogSoftmax(const ConstMatRef& z, Mat& log_P, Mat& P) {
   log_P.resize(z.rows(), z.cols());
   P.resize(z.rows(), z.cols());
-  for (Index b = 0; b < z.cols(); ++b) log_P.col(b) = z.col(b).array() - z.col(b).maxCoeff();
+  const Index K = z.rows();
+  for (Index b = 0; b < z.cols(); ++b) {  // raw loops: K is too short for block expressions
+    const Real* zb = z.data() + b * z.outerStride();
+    Real* l = log_P.data() + b * K;
+    Real largest = zb[0];
+    for (Index k = 1; k < K; ++k) largest = std::max(largest, zb[k]);
+    for (Index k = 0; k < K; ++k) l[k] = zb[k] - largest;
+  }
   P = log_P.array().exp();
-  for (Index b = 0; b < z.cols(); ++b) log_P.col(b).array() -= std::log(P.col(b).sum());
-  P = log_P.array().exp();
+  for (Index b = 0; b < z.cols(); ++b) {
+    Real* l = log_P.data() + b * K;
+    Real* p = P.data() + b * K;
+    Real sum = 0;
+    for (Index k = 0; k < K; ++k) sum += p[k];
+    const Real log_sum = std::log(sum);
+    for (Index k = 0; k < K; ++k) {
+      l[k] -= log_sum;
+      p[k] /= sum;
+    }
+  }
 }
 
 void CategoricalEntropy(const Mat& log_P, const Mat& P, Vec& H) {

@@ -65,12 +65,15 @@ void MemoryAttention::Forward(const ConstMatRef& x, const Memory& m, const Mat* 
   // Softmax over the K scores of each sample and head, which lie together: segment i. Raw loops,
   // as K is too short for block expressions.
   const Real* bias = m.score_bias.data();
+  for (Index b = 0; b < x.cols(); ++b) {
+    Real* a = c.alpha.data() + b * heads * K;
+    for (Index k = 0; k < heads * K; ++k) a[k] += bias[k];
+  }
   const Index segments = heads * x.cols();
   for (Index i = 0; i < segments; ++i) {
     Real* a = c.alpha.data() + i * K;
-    const Real* bias_h = bias + i % heads * K;
     Real largest = -std::numeric_limits<Real>::infinity();
-    for (Index k = 0; k < K; ++k) largest = std::max(largest, a[k] += bias_h[k]);
+    for (Index k = 0; k < K; ++k) largest = std::max(largest, a[k]);
     for (Index k = 0; k < K; ++k) a[k] -= largest;
   }
   c.alpha = c.alpha.array().exp();

@@ -21,23 +21,28 @@ Eigen::Map<const Lanes<kN>> At(const Real* x) {
   return Eigen::Map<const Lanes<kN>>(x);
 }
 
-/// Calls f(kN, i), kN a constant, for pieces [i, i + kN) that make up [0, n): of 8, one of 4, of 1.
+/// Calls f(kN, i), kN a constant, for pieces [i, i + kN) that make up [0, n): of 8, then at most
+/// one each of 4, 2 and 1.
 template <typename F>
 void ForLanes(Index n, F&& f) {
   Index i = 0;
   for (; i + 8 <= n; i += 8) f(std::integral_constant<int, 8>(), i);
-  if (i + 4 <= n) {
+  if (n & 4) {
     f(std::integral_constant<int, 4>(), i);
     i += 4;
   }
-  for (; i < n; ++i) f(std::integral_constant<int, 1>(), i);
+  if (n & 2) {
+    f(std::integral_constant<int, 2>(), i);
+    i += 2;
+  }
+  if (n & 1) f(std::integral_constant<int, 1>(), i);
 }
 
 /// A sum over the pieces of ForLanes.
 struct LaneSum {
   Lanes<8> eights = Lanes<8>::Zero();
   Lanes<4> four = Lanes<4>::Zero();
-  Lanes<1> ones = Lanes<1>::Zero();
+  Real rest = 0;
 
   template <typename Piece>
   void Add(const Piece& x) {
@@ -46,10 +51,10 @@ struct LaneSum {
     } else if constexpr (Piece::SizeAtCompileTime == 4) {
       four += x;
     } else {
-      ones += x;
+      rest += x.sum();
     }
   }
-  Real Total() const { return eights.sum() + four.sum() + ones(0); }
+  Real Total() const { return (eights.head<4>() + eights.tail<4>() + four).sum() + rest; }
 };
 
 }  // namespace o2v

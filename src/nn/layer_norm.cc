@@ -23,18 +23,27 @@ void LayerNorm::Forward(const ConstMatRef& x, Cache& cache, MatRef y) const {
   const Real n_inv = Real(1) / static_cast<Real>(n);
   const Real* g = gain.value.data();
   const Real* b = shift.value.data();
+  // In passes: a column at one go would wait for its sums, then for its root and quotient.
   for (Index j = 0; j < B; ++j) {
     const Real* xj = x.data() + j * x.outerStride();
-    Real* yj = y.data() + j * y.outerStride();
     Real* x_hat = cache.x_hat.data() + j * n;
     LaneSum sum, squares;
     ForLanes(n, [&](auto kN, Index i) { sum.Add(At<kN>(xj + i)); });
     const Real mean = sum.Total() * n_inv;
-    ForLanes(n, [&](auto kN, Index i) { squares.Add((At<kN>(xj + i) - mean).square()); });
-    const Real inv_std = 1 / std::sqrt(squares.Total() * n_inv + kEps);
-    cache.inv_std(j) = inv_std;
     ForLanes(n, [&](auto kN, Index i) {
-      const Lanes<kN> normal = (At<kN>(xj + i) - mean) * inv_std;
+      const Lanes<kN> centred = At<kN>(xj + i) - mean;
+      squares.Add(centred.square());
+      At<kN>(x_hat + i) = centred;
+    });
+    cache.inv_std(j) = squares.Total();
+  }
+  for (Real& squares : cache.inv_std) squares = 1 / std::sqrt(squares * n_inv + kEps);
+  for (Index j = 0; j < B; ++j) {
+    Real* yj = y.data() + j * y.outerStride();
+    Real* x_hat = cache.x_hat.data() + j * n;
+    const Real inv_std = cache.inv_std(j);
+    ForLanes(n, [&](auto kN, Index i) {
+      const Lanes<kN> normal = At<kN>(x_hat + i) * inv_std;
       At<kN>(x_hat + i) = normal;
       At<kN>(yj + i) = At<kN>(g + i) * normal + At<kN>(b + i);
     });

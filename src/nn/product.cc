@@ -112,9 +112,24 @@ void MultiplyStrip(const Factor& A, const Factor& B, Index rows, Index k, Index 
   }
   alignas(32) Real copy[kHeight * kDepth];
   if (A.col_step == 1 && rows == kHeight) {
+    using Stride = Eigen::OuterStride<>;
+    Index q = 0;
+    if constexpr (kN == kLanes) {  // squares are transposed in registers
+      using Square = Eigen::Matrix<Real, kN, kN>;
+      for (; q + kN <= k; q += kN) {
+        for (Index i = 0; i < kHeight; i += kN) {
+          Square square =
+              Eigen::Map<const Square, 0, Stride>(A.From(i, q).data, Stride(A.row_step));
+          square.transposeInPlace();
+          Eigen::Map<Square, 0, Stride>(copy + q * kHeight + i, Stride(kHeight)) = square;
+        }
+      }
+    }
     using Columns = Eigen::Matrix<Real, Eigen::Dynamic, kHeight>;
-    const Eigen::Map<const Columns, 0, Eigen::OuterStride<>> from(A.data, k, kHeight, {A.row_step});
-    Eigen::Map<Eigen::Matrix<Real, kHeight, Eigen::Dynamic>>(copy, kHeight, k) = from.transpose();
+    const Eigen::Map<const Columns, 0, Stride> from(A.From(0, q).data, k - q, kHeight,
+                                                    {A.row_step});
+    Eigen::Map<Eigen::Matrix<Real, kHeight, Eigen::Dynamic>>(copy + q * kHeight, kHeight, k - q) =
+        from.transpose();
   } else {
     for (Index q = 0; q < k; ++q) {
       for (Index i = 0; i < kHeight; ++i) {

@@ -18,29 +18,37 @@ void Batch::Resize(Index S, Index A, Index B) {
 }
 
 void Gather(const Batch& all, std::span<const int> rows, Batch& out) {
-  const Index S = all.s.rows(), A = all.a.rows();
-  const bool has_P = all.P_old.size() > 0, has_stop = !all.stop.empty();
-  out.Resize(S, A, static_cast<Index>(rows.size()));
-  if (has_P) out.P_old.resize(all.P_old.rows(), out.Size());
-  if (has_stop) out.stop.resize(rows.size());
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const Index to = static_cast<Index>(i), from = rows[i];
-    const std::size_t row = static_cast<std::size_t>(from);
-    const Real* s = all.s.data() + from * S;  // short columns: plain loops beat block copies
-    const Real* a = all.a.data() + from * A;
-    for (Index k = 0; k < S; ++k) out.s(k, to) = s[k];
-    for (Index k = 0; k < A; ++k) out.a(k, to) = a[k];
-    out.o[i] = all.o[row];
-    out.o_prev[i] = all.o_prev[row];
-    out.init[i] = all.init[row];
-    out.high.logp_old(to) = all.high.logp_old(from);
-    out.high.adv_hat(to) = all.high.adv_hat(from);
-    out.high.ret(to) = all.high.ret(from);
-    out.low.logp_old(to) = all.low.logp_old(from);
-    out.low.adv_hat(to) = all.low.adv_hat(from);
-    out.low.ret(to) = all.low.ret(from);
-    if (has_P) out.P_old.col(to) = all.P_old.col(from);
-    if (has_stop) out.stop[i] = all.stop[row];
+  const Index B = static_cast<Index>(rows.size());
+  const auto entries = [&](const auto& from, auto& to) {
+    for (Index i = 0; i < B; ++i) to.data()[i] = from.data()[rows[std::size_t(i)]];
+  };
+  const auto columns = [&](const Mat& from, Mat& to) {  // short ones: plain loops beat block copies
+    const Index n = from.rows();
+    for (Index i = 0; i < B; ++i) {
+      const Real* column = from.data() + rows[std::size_t(i)] * n;
+      for (Index k = 0; k < n; ++k) to(k, i) = column[k];
+    }
+  };
+  out.Resize(all.s.rows(), all.a.rows(), B);
+  columns(all.s, out.s);
+  columns(all.a, out.a);
+  entries(all.o, out.o);
+  entries(all.o_prev, out.o_prev);
+  entries(all.init, out.init);
+  for (auto stream : {&Batch::high, &Batch::low}) {
+    const Stream& from = all.*stream;
+    Stream& to = out.*stream;
+    entries(from.logp_old, to.logp_old);
+    entries(from.adv_hat, to.adv_hat);
+    entries(from.ret, to.ret);
+  }
+  if (all.P_old.size() > 0) {
+    out.P_old.resize(all.P_old.rows(), B);
+    columns(all.P_old, out.P_old);
+  }
+  if (!all.stop.empty()) {
+    out.stop.resize(rows.size());
+    entries(all.stop, out.stop);
   }
 }
 

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "algo/setup.h"
 #include "base/stats.h"
 
@@ -49,21 +51,29 @@ class Learning : public testing::TestWithParam<std::string> {};
 
 TEST_P(Learning, KeepsAPointNearZero) {
   // An untrained policy pushes at random: |x| is about 0.5, so an episode of 50 steps costs about
-  // 25. A trained one is at 0 within ten steps and stays within its noise: over seeds 1 to 6 it
-  // cost 1.3 to 4.7.
+  // 25. A trained one is at 0 within ten steps and stays within its noise: over 60 seeds Option2Vec
+  // cost 1.6 to 7.6, 2.4 in the median. One run can lie in that tail, a mean of three does not.
+  constexpr int kSeeds = 3;
   for (const Fidelity fidelity : {Fidelity::kPaper, Fidelity::kReleased}) {
     const Budget budget = BudgetOf(GetParam());
-    const RunConfig config = SmallConfig(GetParam(), fidelity, budget.set);
-    VecEnv env = PointTask(config.workers, /*time_limit=*/50);
-    const auto algorithm = MakeRunAlgorithm(config, env.Spec());
-    const Trained trained(*algorithm, env, budget.steps);
-    EXPECT_LT(trained.First(), -15) << ToString(fidelity);
-    EXPECT_GT(trained.Last(), -7) << ToString(fidelity);
-    for (const std::string& stage : algorithm->Stages()) {
-      const std::string name = "value_loss_" + stage;
-      EXPECT_LT(Stat(*algorithm, trained.updates.back(), name),
-                0.5 * Stat(*algorithm, trained.updates.front(), name))
-          << ToString(fidelity) << ", " << stage;
+    RunConfig config = SmallConfig(GetParam(), fidelity, budget.set);
+    double first = 0, last = 0;                      // returns
+    std::map<std::string, double> loss_first, loss;  // of the first and the last update
+    for (config.seed = 1; config.seed <= kSeeds; ++config.seed) {
+      VecEnv env = PointTask(config.workers, /*time_limit=*/50);
+      const auto algorithm = MakeRunAlgorithm(config, env.Spec());
+      const Trained trained(*algorithm, env, budget.steps);
+      first += trained.First() / kSeeds;
+      last += trained.Last() / kSeeds;
+      for (const std::string& stage : algorithm->Stages()) {
+        loss_first[stage] += Stat(*algorithm, trained.updates.front(), "value_loss_" + stage);
+        loss[stage] += Stat(*algorithm, trained.updates.back(), "value_loss_" + stage);
+      }
+    }
+    EXPECT_LT(first, -15) << ToString(fidelity);
+    EXPECT_GT(last, -7) << ToString(fidelity);
+    for (const auto& [stage, value] : loss_first) {
+      EXPECT_LT(loss[stage], 0.5 * value) << ToString(fidelity) << ", " << stage;
     }
   }
 }
