@@ -4,7 +4,7 @@ import argparse
 import math
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from pathlib import Path
 
 import numpy as np
@@ -76,7 +76,7 @@ def build(results: Path, experiments: Sequence[str] | None = None
         Heading("Cost"), *_cost(read_bench(results)), *drawn(fig_cost),
         Heading("Gradients and physics"), *_checks(gradcheck, read_rows(results, "parity")),
         Heading("Theory"), *_theory(theory),
-        Heading("Deviations"), *_deviations(read_switches(results), cells),
+        Heading("Deviations"), *_deviations(read_switches(results), cells, sources["authors"]),
         Heading("Missing runs"), *_missing(cells),
     ], drawings
 
@@ -400,7 +400,7 @@ def _theory(theory: Rows) -> list[Block]:
 # ---- Deviations, missing runs
 
 
-def _deviations(switches: Rows, cells: Mapping[Key, Cell]) -> list[Block]:
+def _deviations(switches: Rows, cells: Mapping[Key, Cell], authors: Samples) -> list[Block]:
     if not switches:
         return [Paragraph("No results/switches.txt yet (`make report` writes it).")]
     rows = []
@@ -419,7 +419,7 @@ def _deviations(switches: Rows, cells: Mapping[Key, Cell]) -> list[Block]:
                       "fidelity has them (Student's t of the pairs)."),
             Table(["switch", "methods", "the paper", "the released code", "other values",
                    "our `paper` runs", "our `released` runs", "measured effect"], rows),
-            *_sizes(cells)]
+            *_sizes(cells), *_numbers({s["switch"] for s in switches}, cells, authors)]
 
 
 def _sizes(cells: Mapping[Key, Cell]) -> list[Block]:
@@ -438,6 +438,31 @@ def _sizes(cells: Mapping[Key, Cell]) -> list[Block]:
         return [Paragraph("No task has runs of both fidelities whose sizes differ yet.")]
     return [Table(["method", "number", "our `paper` runs", "our `released` runs", "on"],
                   [[*line, ", ".join(on)] for line, on in sorted(tasks.items())])]
+
+
+def _numbers(switches: Set[str], cells: Mapping[Key, Cell], authors: Samples) -> list[Block]:
+    """Runs with a number of the method changed and all else as in the fidelity."""
+    rows = []
+    changed = {(key.fidelity, key.variant) for key in cells
+               if key.variant and key.variant.partition("=")[0] not in switches}
+    for fidelity, variant in sorted(changed):
+        turned, base = our_samples(cells, fidelity, variant), our_samples(cells, fidelity)
+        for key in sorted(turned, key=lambda k: (k[1], ALL_TASKS.index(k[0]))):
+            task, method = key
+            rows.append([METHODS[method], fidelity, variant, task,
+                         *(_ends(s.get(key)) for s in (turned, base, authors))])
+    if not rows:
+        return []
+    return [Paragraph("A number of the method changed on its own. Return at the end; of a pair at "
+                      "the end of the first and of the second task."),
+            Table(["method", "fidelity", "number", "task", "with it", "without", "authors"], rows)]
+
+
+def _ends(sample: Sample | None) -> str:
+    if sample is None:
+        return "-"
+    ends = (sample.first, sample.final) if len(sample.first) else (sample.final,)
+    return ", ".join(moments(Moments.of(end)) for end in ends)
 
 
 def _ran(switch: str, fidelity: str, cells: Mapping[Key, Cell]) -> str:

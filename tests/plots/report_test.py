@@ -51,6 +51,8 @@ class ReportTest(unittest.TestCase):
                    fidelity="released", experiment="transfer")
         write_flat(results, "HalfCheetah-v2", "ppo", [55, 65, 76, 1, 1], experiment="ablation",
                    fidelity="paper-timelimit=released")
+        write_flat(results, "Cheetah", "ppo", [9, 11], settings="hidden = 32",
+                   fidelity="released-hidden=32", experiment="ablation")
         (results / "switches.txt").write_text(
             "switch     paper  released  takes            methods  effect\n"
             "timelimit  paper  released  paper, released  all      bootstrap | terminal\n")
@@ -116,6 +118,13 @@ class ReportTest(unittest.TestCase):
         self.assertEqual(row[-1], "paper with released, HalfCheetah-v2, PPO: "
                                   "+5.333 [+3.899, +6.768], p = 0.0039 (n = 3)")
         self.assertEqual(row[-3], "paper (12)")  # without the one of an older revision
+
+    def test_runs_with_a_number_changed_stand_beside_those_without(self):
+        row = self.row("PPO", "released", "hidden=32", "Cheetah")
+        self.assertEqual(row[4:6], ["10.00 ± 1.000 (2), 10.00 ± 1.000 (2)",
+                                    "7.500 ± 0.500 (2), 7.500 ± 0.500 (2)"])
+        self.assertRegex(row[6], r"^290\S* ± 4\S* \(10\), 72")
+        self.assertEqual(self.rows("PPO", "paper", "timelimit=released"), [])
 
     def test_the_ledger_judges_three_sources(self):
         row = self.row("Q2: Best on the four tasks without termination")

@@ -9,8 +9,10 @@ namespace {
 Batch Numbered(Index B) {
   Batch batch;
   batch.Resize(2, 1, B);
+  batch.P_old.resize(3, B);
+  batch.stop.resize(std::size_t(B));
   for (Index b = 0; b < B; ++b) {
-    const Real x = Real(10 * b);
+    const Real x = Real(20 * b);
     const std::size_t i = std::size_t(b);
     batch.s.col(b) << x, x + 1;
     batch.a(0, b) = x + 2;
@@ -23,6 +25,8 @@ Batch Numbered(Index B) {
     batch.low.logp_old(b) = x + 6;
     batch.low.adv_hat(b) = x + 7;
     batch.low.ret(b) = x + 8;
+    batch.P_old.col(b) << x + 9, x + 10, x + 11;
+    batch.stop[i] = b % 3 == 1;
   }
   return batch;
 }
@@ -34,7 +38,7 @@ TEST(Gather, CopiesEveryArrayOfTheSamples) {
   ASSERT_EQ(out.Size(), 2);
   for (Index to = 0; to < 2; ++to) {
     const Index b = to == 0 ? 4 : 1;
-    const Real x = Real(10 * b);
+    const Real x = Real(20 * b);
     const std::size_t i = std::size_t(to);
     EXPECT_EQ(out.s(0, to), x);
     EXPECT_EQ(out.s(1, to), x + 1);
@@ -48,7 +52,18 @@ TEST(Gather, CopiesEveryArrayOfTheSamples) {
     EXPECT_EQ(out.low.logp_old(to), x + 6);
     EXPECT_EQ(out.low.adv_hat(to), x + 7);
     EXPECT_EQ(out.low.ret(to), x + 8);
+    for (Index k = 0; k < 3; ++k) EXPECT_EQ(out.P_old(k, to), x + 9 + Real(k));
+    EXPECT_EQ(out.stop[i], b % 3 == 1);
   }
+}
+
+TEST(Gather, LeavesOutWhatTheMethodDoesNotKeep) {
+  Batch all = Numbered(5), out;
+  all.P_old.resize(0, 0);
+  all.stop.clear();
+  Gather(all, std::vector<int>{4, 1}, out);
+  EXPECT_EQ(out.P_old.size(), 0);
+  EXPECT_TRUE(out.stop.empty());
 }
 
 TEST(Gather, ResizesOnlyWhenTheSizeChanges) {
