@@ -290,17 +290,21 @@ def _row(task: str, method: str, ours: Samples, authors: Samples) -> list[str]:
                                  bootstrap(improvement, best.final, sample.final)) + f" {seeds}",
                   f"{number(d.mean, '+')} {interval(d.interval, '+')}".removesuffix(" -")
                   + f" {seeds}", p_value(d.p)]
-    remarks = [f"at {sample.step} steps"] if sample.shortened else []
-    remarks += [f"{sample.diverged} diverged"] if sample.diverged else []
-    remarks += [f"{sample.older} of older revisions left out"] if sample.older else []
     row = [task, METHODS[method], moments(sample.moments),
            _with_interval(iqm(sample.final), bootstrap(iqm, sample.final)), moments(theirs),
            p_value(welch(sample.moments, theirs).p) if theirs else "-", *beside,
-           ", ".join(remarks)]
+           _remarks(sample, sample)]
     if task in PAIRS:
         row += [moments(Moments.of(s.first)) if s is not None and len(s.first) else "-"
                 for s in (sample, published)]
     return row
+
+
+def _remarks(sample: Sample | None, runs: Sample | Cell) -> str:
+    remarks = [f"at {sample.step} steps"] if sample is not None and sample.shortened else []
+    remarks += [f"{runs.diverged} diverged"] if runs.diverged else []
+    remarks += [f"{runs.older} of older revisions left out"] if runs.older else []
+    return ", ".join(remarks)
 
 
 def _mean_improvement(tasks: Sequence[str], method: str, samples: Samples) -> str:
@@ -442,20 +446,30 @@ def _sizes(cells: Mapping[Key, Cell]) -> list[Block]:
 
 def _numbers(switches: Set[str], cells: Mapping[Key, Cell], authors: Samples) -> list[Block]:
     """Runs with a number of the method changed and all else as in the fidelity."""
+    sources = {f: our_samples(cells, f) for f in FIDELITIES}
+    changed = [key for key in cells
+               if key.variant and key.variant.partition("=")[0] not in switches]
     rows = []
-    changed = {(key.fidelity, key.variant) for key in cells
-               if key.variant and key.variant.partition("=")[0] not in switches}
-    for fidelity, variant in sorted(changed):
-        turned, base = our_samples(cells, fidelity, variant), our_samples(cells, fidelity)
-        for key in sorted(turned, key=lambda k: (k[1], ALL_TASKS.index(k[0]))):
-            task, method = key
-            rows.append([METHODS[method], fidelity, variant, task,
-                         *(_ends(s.get(key)) for s in (turned, base, authors))])
+    for key in sorted(changed, key=lambda k: (k.variant, k.fidelity, k.algorithm,
+                                              ALL_TASKS.index(k.task))):
+        turned, base = cells[key], cells.get(key._replace(variant=""))
+        where = key.task, key.algorithm
+        name = f"algo.{key.algorithm}.{key.variant.partition('=')[0]}"
+        usual = f", not {base.runs[0].settings[name]}" if base else ""
+        sample = our_samples({key: turned}, key.fidelity, key.variant).get(where)
+        gains = _gains(turned, base)
+        rows.append([
+            METHODS[key.algorithm], key.fidelity, key.variant + usual, key.task,
+            _ends(sample), _ends(sources[key.fidelity].get(where)), _ends(authors.get(where)),
+            _paired(gains) if gains else "-", _remarks(sample, turned)])
     if not rows:
         return []
     return [Paragraph("A number of the method changed on its own. Return at the end; of a pair at "
-                      "the end of the first and of the second task."),
-            Table(["method", "fidelity", "number", "task", "with it", "without", "authors"], rows)]
+                      "the end of the first and of the second task. Difference: at the end, by "
+                      "seed (Student's t). Which number a log of the authors has is inferred from "
+                      "dates."),
+            Table(["method", "fidelity", "number", "task", "with it", "without", "authors",
+                   "with less without [95 %]", "remarks"], rows)]
 
 
 def _ends(sample: Sample | None) -> str:
@@ -481,18 +495,26 @@ def _effects(switch: str, cells: Mapping[Key, Cell]) -> list[str]:
         name, _, value = key.variant.partition("=")
         if name != switch:
             continue
-        turned, base = cells[key], cells.get(key._replace(variant=""))
-        if base is None or turned.wanted != base.wanted:
-            continue
-        # A seed's two runs share initial weights and random streams.
-        without = {run.seed: run.ret[-1] for run in base.whole}
-        gains = [run.ret[-1] - without[run.seed] for run in turned.whole if run.seed in without]
+        gains = _gains(cells[key], cells.get(key._replace(variant="")))
         if gains:
-            d = one_sample(Moments.of(gains))
             texts.append(f"{key.fidelity} with {value}, {key.task}, {METHODS[key.algorithm]}: "
-                         f"{number(d.mean, '+')} {interval(d.interval, '+')}, {p_clause(d.p)} "
-                         f"(n = {len(gains)})")
+                         + _paired(gains))
     return texts
+
+
+def _gains(turned: Cell, base: Cell | None) -> list[float]:
+    """Return at the end with something changed less that without. A seed's two runs share initial
+    weights and random streams."""
+    if base is None or turned.wanted != base.wanted:
+        return []
+    without = {run.seed: run.ret[-1] for run in base.whole}
+    return [run.ret[-1] - without[run.seed] for run in turned.whole if run.seed in without]
+
+
+def _paired(gains: Sequence[float]) -> str:
+    d = one_sample(Moments.of(gains))
+    return (f"{number(d.mean, '+')} {interval(d.interval, '+')}, {p_clause(d.p)} "
+            f"(n = {len(gains)})")
 
 
 def _missing(cells: Mapping[Key, Cell]) -> list[Block]:

@@ -9,7 +9,7 @@
 
 namespace o2v {
 
-/// Logits z (K, B) -> log_P, P (K, B): log_P = z - logsumexp(z), P = exp(log_P).
+/// Logits z (K, B) -> log_P, P (K, B): log_P = z - logsumexp(z), P = softmax(z).
 void LogSoftmax(const ConstMatRef& z, Mat& log_P, Mat& P);
 
 /// H (B) = -sum_k P_k ln P_k.

@@ -62,13 +62,13 @@ void MemoryAttention::Forward(const ConstMatRef& x, const Memory& m, const Mat* 
   const Index K = m.keys.cols();
   c.alpha.resize(heads * K, x.cols());
   SetAtB(m.score_map, x, c.alpha);
-  // Softmax over the K scores of each sample and head, which lie together: segment i. Raw loops,
-  // as K is too short for block expressions.
   const Real* bias = m.score_bias.data();
   for (Index b = 0; b < x.cols(); ++b) {
     Real* a = c.alpha.data() + b * heads * K;
     for (Index k = 0; k < heads * K; ++k) a[k] += bias[k];
   }
+  // Softmax over the K scores of each sample and head, which lie together: segment i. Raw loops,
+  // as K is too short for block expressions.
   const Index segments = heads * x.cols();
   for (Index i = 0; i < segments; ++i) {
     Real* a = c.alpha.data() + i * K;

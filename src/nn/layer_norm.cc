@@ -23,7 +23,8 @@ void LayerNorm::Forward(const ConstMatRef& x, Cache& cache, MatRef y) const {
   const Real n_inv = Real(1) / static_cast<Real>(n);
   const Real* g = gain.value.data();
   const Real* b = shift.value.data();
-  // In passes: a column at one go would wait for its sums, then for its root and quotient.
+  // In passes: a column at one go would wait for its root and quotient. Meanwhile inv_std holds the
+  // sum of squares.
   for (Index j = 0; j < B; ++j) {
     const Real* xj = x.data() + j * x.outerStride();
     Real* x_hat = cache.x_hat.data() + j * n;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "base/check.h"
 #include "random_mat.h"
@@ -31,12 +32,28 @@ TEST(LogSoftmax, SumsToOneAndIgnoresShifts) {
 }
 
 TEST(LogSoftmax, StaysFiniteForExtremeLogits) {
-  Mat z(3, 1), log_P, P;
-  z << 1000, -1000, 0;
+  Mat z(3, 3), log_P, P;
+  z << 1000, -1000, 0,  //
+      -1000, 0, 1000,   //
+      0, 1000, -1000;
   LogSoftmax(z, log_P, P);
-  EXPECT_EQ(log_P(0), 0);
-  EXPECT_EQ(log_P(1), -2000);
-  EXPECT_EQ(P(0), 1);
+  for (Index b = 0; b < 3; ++b) {
+    for (Index k = 0; k < 3; ++k) {
+      EXPECT_EQ(log_P(k, b), z(k, b) - 1000);
+      EXPECT_NEAR(P(k, b), z(k, b) == 1000 ? 1 : 0, 1e-38);  // Eigen's exp stops at 3e-39
+    }
+  }
+}
+
+TEST(LogSoftmax, PassesNanOn) {
+  const Real nan = std::numeric_limits<Real>::quiet_NaN();
+  Mat z(3, 3), log_P, P;
+  z << nan, 1, 2,  //
+      1, nan, 3,   //
+      2, 3, nan;
+  LogSoftmax(z, log_P, P);
+  EXPECT_TRUE(log_P.array().isNaN().all());
+  EXPECT_TRUE(P.array().isNaN().all());
 }
 
 TEST(CategoricalEntropy, LiesBetweenZeroAndLogK) {

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <map>
-
 #include "algo/setup.h"
 #include "base/stats.h"
 
@@ -52,29 +50,29 @@ class Learning : public testing::TestWithParam<std::string> {};
 TEST_P(Learning, KeepsAPointNearZero) {
   // An untrained policy pushes at random: |x| is about 0.5, so an episode of 50 steps costs about
   // 25. A trained one is at 0 within ten steps and stays within its noise: over 60 seeds Option2Vec
-  // cost 1.6 to 7.6, 2.4 in the median. One run can lie in that tail, a mean of three does not.
+  // cost 1.5 to 2 in `paper`, 1.6 to 7.6 with a median of 2.4 in `released`. One run may lie in
+  // that tail, the mean of three hardly does.
   constexpr int kSeeds = 3;
   for (const Fidelity fidelity : {Fidelity::kPaper, Fidelity::kReleased}) {
     const Budget budget = BudgetOf(GetParam());
     RunConfig config = SmallConfig(GetParam(), fidelity, budget.set);
-    double first = 0, last = 0;                      // returns
-    std::map<std::string, double> loss_first, loss;  // of the first and the last update
+    double last = 0;
     for (config.seed = 1; config.seed <= kSeeds; ++config.seed) {
+      SCOPED_TRACE(ToString(fidelity) + ", seed " + std::to_string(config.seed));
       VecEnv env = PointTask(config.workers, /*time_limit=*/50);
       const auto algorithm = MakeRunAlgorithm(config, env.Spec());
       const Trained trained(*algorithm, env, budget.steps);
-      first += trained.First() / kSeeds;
-      last += trained.Last() / kSeeds;
+      EXPECT_LT(trained.First(), -15);
+      EXPECT_GT(trained.Last(), -10);
       for (const std::string& stage : algorithm->Stages()) {
-        loss_first[stage] += Stat(*algorithm, trained.updates.front(), "value_loss_" + stage);
-        loss[stage] += Stat(*algorithm, trained.updates.back(), "value_loss_" + stage);
+        const std::string name = "value_loss_" + stage;
+        EXPECT_LT(Stat(*algorithm, trained.updates.back(), name),
+                  0.5 * Stat(*algorithm, trained.updates.front(), name))
+            << stage;
       }
+      last += trained.Last() / kSeeds;
     }
-    EXPECT_LT(first, -15) << ToString(fidelity);
-    EXPECT_GT(last, -7) << ToString(fidelity);
-    for (const auto& [stage, value] : loss_first) {
-      EXPECT_LT(loss[stage], 0.5 * value) << ToString(fidelity) << ", " << stage;
-    }
+    EXPECT_GT(last, -5) << ToString(fidelity);
   }
 }
 

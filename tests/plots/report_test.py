@@ -53,6 +53,9 @@ class ReportTest(unittest.TestCase):
                    fidelity="paper-timelimit=released")
         write_flat(results, "Cheetah", "ppo", [9, 11], settings="hidden = 32",
                    fidelity="released-hidden=32", experiment="ablation")
+        write_run(results, "Fish", "ppo", 0, [1], settings="hidden = 32", steps=10_000,
+                  wanted=2_000_000, fidelity="released-hidden=32", experiment="ablation",
+                  status="diverged")
         (results / "switches.txt").write_text(
             "switch     paper  released  takes            methods  effect\n"
             "timelimit  paper  released  paper, released  all      bootstrap | terminal\n")
@@ -120,11 +123,15 @@ class ReportTest(unittest.TestCase):
         self.assertEqual(row[-3], "paper (12)")  # without the one of an older revision
 
     def test_runs_with_a_number_changed_stand_beside_those_without(self):
-        row = self.row("PPO", "released", "hidden=32", "Cheetah")
+        # Differences 2 and 3: t = 2.5 / 0.5 with 1 degree of freedom, p 0.126.
+        row = self.row("PPO", "released", "hidden=32, not 128", "Cheetah")
         self.assertEqual(row[4:6], ["10.00 ± 1.000 (2), 10.00 ± 1.000 (2)",
                                     "7.500 ± 0.500 (2), 7.500 ± 0.500 (2)"])
         self.assertRegex(row[6], r"^290\S* ± 4\S* \(10\), 72")
+        self.assertEqual(row[7], "+2.500 [-3.853, +8.853], p = 0.13 (n = 2)")
         self.assertEqual(self.rows("PPO", "paper", "timelimit=released"), [])
+        lost = self.row("PPO", "released", "hidden=32", "Fish")
+        self.assertEqual((lost[4], lost[7:]), ("-", ["-", "1 diverged"]))
 
     def test_the_ledger_judges_three_sources(self):
         row = self.row("Q2: Best on the four tasks without termination")

@@ -5,7 +5,7 @@
 namespace o2v {
 namespace {
 
-/// Sample b of every array holds a number that only it has.
+/// Sample b of every array of numbers holds one that only it has.
 Batch Numbered(Index B) {
   Batch batch;
   batch.Resize(2, 1, B);
@@ -16,8 +16,8 @@ Batch Numbered(Index B) {
     const std::size_t i = std::size_t(b);
     batch.s.col(b) << x, x + 1;
     batch.a(0, b) = x + 2;
-    batch.o[i] = int(b) % 4;
-    batch.o_prev[i] = int(b + 1) % 4;
+    batch.o[i] = int(b);
+    batch.o_prev[i] = int(b + 1);
     batch.init[i] = b % 2 == 0;
     batch.high.logp_old(b) = x + 3;
     batch.high.adv_hat(b) = x + 4;
@@ -34,17 +34,18 @@ Batch Numbered(Index B) {
 TEST(Gather, CopiesEveryArrayOfTheSamples) {
   const Batch all = Numbered(5);
   Batch out;
-  Gather(all, std::vector<int>{4, 1}, out);
-  ASSERT_EQ(out.Size(), 2);
-  for (Index to = 0; to < 2; ++to) {
-    const Index b = to == 0 ? 4 : 1;
+  const std::vector<int> rows = {1, 4, 0};  // in place the flags would be others
+  Gather(all, rows, out);
+  ASSERT_EQ(out.Size(), 3);
+  for (Index to = 0; to < 3; ++to) {
+    const Index b = rows[std::size_t(to)];
     const Real x = Real(20 * b);
     const std::size_t i = std::size_t(to);
     EXPECT_EQ(out.s(0, to), x);
     EXPECT_EQ(out.s(1, to), x + 1);
     EXPECT_EQ(out.a(0, to), x + 2);
-    EXPECT_EQ(out.o[i], int(b) % 4);
-    EXPECT_EQ(out.o_prev[i], int(b + 1) % 4);
+    EXPECT_EQ(out.o[i], int(b));
+    EXPECT_EQ(out.o_prev[i], int(b + 1));
     EXPECT_EQ(out.init[i], b % 2 == 0);
     EXPECT_EQ(out.high.logp_old(to), x + 3);
     EXPECT_EQ(out.high.adv_hat(to), x + 4);
