@@ -104,6 +104,13 @@ void PrepareFolder(const fs::path& dir, const std::string& config, bool resume,
   RequireSameConfig(path, config);
 }
 
+/// True when no entry is infinite or NaN: these times zero are NaN. Unlike Eigen's allFinite, in
+/// whole registers.
+template <typename Derived>
+bool AllFinite(const Eigen::DenseBase<Derived>& x) {
+  return (x.derived().array() * 0).sum() == 0;
+}
+
 /// What a person sees of a run.
 class Progress {
  public:
@@ -191,6 +198,7 @@ class Run {
         dir_(dir),
         env_(MakeTask(0), config.workers, config.seed),
         algorithm_(parts.make_algorithm(env_.Spec())),
+        params_(algorithm_->Params()),
         logs_(dir, algorithm_->StatNames(), config.eval_every > 0),
         progress_(progress, terminal, config.steps) {}
 
@@ -240,17 +248,14 @@ class Run {
     return RunStatus::kDone;
   }
 
-  /// Writes what a run of this status leaves behind.
+  /// Writes what a run of this status leaves behind, the record last.
   void Finish(RunStatus status) {
-    LogEpisodes();       // of a rollout that diverged
+    LogEpisodes();       // of a rollout or an update that diverged
     logs_.EndUpdates();  // a resumed run cuts it off again
     logs_.Flush();
     manifest_.end = Now();
-    Stamp(status);
-    if (status != RunStatus::kStopped) {
-      WriteRecord(dir_, ManifestJson(manifest_), config_.steps);
-    }
-    WriteManifest(dir_, manifest_);
+    Record(status);
+    if (status != RunStatus::kStopped) WriteRecord(dir_, ManifestJson(manifest_), config_.steps);
   }
 
  private:
@@ -287,9 +292,27 @@ class Run {
     const std::int64_t before = env_.TotalSteps();
     algorithm_->Collect(env_, episodes_);
     const std::vector<Ratio>& stats = algorithm_->Update();
+    RequireFinite(stats);
     LogEpisodes();
     logs_.AddUpdate(env_.TotalSteps(), stats);
     if (Crossed(config_.eval_every, before, env_.TotalSteps())) LogEvaluation();
+  }
+
+  /// Throws DivergedError when the update left a number that is not finite, before that is logged
+  /// or saved: a statistic, a parameter, the normaliser.
+  void RequireFinite(const std::vector<Ratio>& stats) const {
+    for (std::size_t i = 0; i < stats.size(); ++i) {
+      if (!std::isfinite(stats[i].sum)) Diverged(algorithm_->StatNames()[i]);
+    }
+    for (const Param* p : params_) {
+      if (!AllFinite(p->value)) Diverged(p->name);
+    }
+    if (!AllFinite(env_.normalizer().mean())) Diverged("normalizer.mean");
+    if (!AllFinite(env_.normalizer().var())) Diverged("normalizer.var");
+  }
+  [[noreturn]] void Diverged(const std::string& what) const {
+    throw DivergedError(Concat(env_.Spec().id, ": ", what,
+                               " is not finite after the update at step ", env_.TotalSteps()));
   }
 
   void LogEpisodes() {
@@ -336,6 +359,7 @@ class Run {
   int task_ = 0;  // that the workers are on
   VecEnv env_;
   std::unique_ptr<Algorithm> algorithm_;
+  const std::vector<Param*> params_;
   RunLogs logs_;
   Progress progress_;
   Manifest manifest_;
@@ -374,8 +398,8 @@ RunStatus Train(const RunConfig& config, const RunParts& parts, const fs::path& 
   const FolderLock lock(folder);
   const std::optional<Manifest> before = ReadManifest(folder);
   PrepareFolder(folder, ToToml(config), resume, before);
-  run.Start(before);
   try {
+    run.Start(before);
     const RunStatus status = run.Loop();
     run.Finish(status);
     return status;

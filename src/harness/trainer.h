@@ -38,9 +38,11 @@ struct RunHooks {
 ///
 /// A folder that another process trains in, that is finished or diverged, that holds something
 /// else, or that is unfinished while `resume` is false is refused with ConfigError, and so is one
-/// whose config.toml differs. With `resume` a folder that does not exist yet is started. On
-/// DivergedError the last checkpoint is kept, the manifest says so, and the error goes on to the
-/// caller.
+/// whose config.toml differs. With `resume` a folder that does not exist yet is started.
+///
+/// A run diverges where the simulator does, or where an update leaves a statistic, a parameter or
+/// the normaliser not finite. That update is neither logged nor saved: last.ckpt is the last
+/// healthy one. The manifest says so, and the DivergedError goes on to the caller.
 ///
 /// `progress` gets one line that is rewritten (`terminal`) or one every 10 s.
 ///

@@ -1,6 +1,7 @@
 #include "rollout/vec_env.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "base/check.h"
@@ -77,6 +78,10 @@ void VecEnv::Step(const Mat& a, Transition& out, std::vector<Episode>& episodes)
     out.terminated[i] = result.terminated;
     out.truncated[i] = result.truncated;
     returns_(col) += result.reward;
+    if (!std::isfinite(returns_(col))) {
+      throw DivergedError(Concat(spec.id, ": the return of worker ", i, " is ", returns_(col),
+                                 " at step ", lengths_[i] + 1, " of the episode"));
+    }
     ++lengths_[i];
     init_[i] = out.Done(i);
     if (out.Done(i)) {

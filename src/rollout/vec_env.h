@@ -55,6 +55,7 @@ class VecEnv {
   /// Puts the workers on another task without touching anything else, for Visit to fill in.
   void ReplaceEnvs(const Factory& make);
   /// Steps every worker with a (A, N), clipped here to the control range. Appends ended episodes.
+  /// Throws DivergedError as Env::Step, and when a return overflows.
   void Step(const Mat& a, Transition& out, std::vector<Episode>& episodes);
 
   /// (S, N) normalised states; at an episode's end the reset observation. Spec 1.1.

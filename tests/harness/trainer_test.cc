@@ -6,10 +6,14 @@
 
 #include <fcntl.h>
 
+#include <cmath>
+#include <limits>
 #include <sstream>
+#include <tuple>
 
 #include "fake_run.h"
 #include "harness/checkpoint.h"
+#include "harness/record.h"
 
 namespace o2v {
 namespace {
@@ -274,6 +278,101 @@ TEST_F(Trainer, KeepsWhatADivergedRunHas) {
   ASSERT_EQ(updates.Rows(), 1u);  // of the nine updates before
   EXPECT_EQ(updates.At(0, 0), 90);
   EXPECT_EQ(Refused([&] { Resume("run"); }), (dir_ / "run").string() + ": this run is diverged");
+}
+
+/// Spoils what the update at `left` = 1 leaves behind.
+class SpoiledAlgorithm final : public FakeAlgorithm {
+ public:
+  enum class What { kStatistic, kParameter };
+  SpoiledAlgorithm(const EnvSpec& spec, std::uint64_t seed, What what, double value)
+      : FakeAlgorithm(spec, seed), what_(what), value_(value) {}
+
+  const std::vector<Ratio>& Update() override {
+    stats_ = FakeAlgorithm::Update();
+    if (--left_ == 0) {
+      if (what_ == What::kStatistic) stats_[1].sum = value_;
+      if (what_ == What::kParameter) Params()[1]->value(0) = static_cast<Real>(value_);
+    }
+    return stats_;
+  }
+
+ private:
+  What what_;
+  double value_;
+  int left_ = 10;  // the update at step 100, after three checkpoints
+  std::vector<Ratio> stats_;
+};
+
+TEST_F(Trainer, AnUpdateThatIsNotFiniteIsNeitherLoggedNorSaved) {
+  config_.eval_every = 0;
+  Start("healthy");
+  const std::string all = ReadFile(dir_ / "healthy" / "episodes.csv");
+  using What = SpoiledAlgorithm::What;
+  const double nan = std::nan(""), inf = std::numeric_limits<double>::infinity();
+  for (const auto& [what, value, name] : {std::tuple{What::kStatistic, nan, "nudge"},
+                                          {What::kStatistic, -inf, "nudge"},
+                                          {What::kParameter, nan, "actor.b"},
+                                          {What::kParameter, inf, "actor.b"}}) {
+    const std::string run = Concat(name, value);
+    parts_.make_algorithm = [&, what = what, value = value](const EnvSpec& spec) {
+      return std::make_unique<SpoiledAlgorithm>(spec, config_.seed, what, value);
+    };
+    try {
+      Start(run);
+      ADD_FAILURE() << run << " did not diverge";
+    } catch (const DivergedError& e) {
+      EXPECT_EQ(e.what(), Concat("Fake-v0: ", name, " is not finite after the update at step 100"));
+    }
+    EXPECT_EQ(ReadMetadata(dir_ / run / "last.ckpt").at("total_steps"), "90");
+    const Manifest manifest = ReadManifest(dir_ / run).value();
+    EXPECT_EQ(manifest.status, RunStatus::kDiverged);
+    EXPECT_EQ(manifest.steps, 100);
+    EXPECT_EQ(ReadRecord(dir_ / (run + ".json")).status, RunStatus::kDiverged);
+    EXPECT_TRUE(fs::exists(dir_ / (run + ".csv")));
+    const CsvTable updates = ReadUpdates(dir_ / run / "updates.csv");
+    ASSERT_EQ(updates.Rows(), 1u);  // the nine healthy ones
+    EXPECT_EQ(updates.At(0, 0), 90);
+    // The episodes that ended in the first hundred steps, also in the rollout of the bad update.
+    const std::string kept = ReadFile(dir_ / run / "episodes.csv");
+    EXPECT_TRUE(all.starts_with(kept));
+    const auto episodes = ReadEpisodes(dir_ / "healthy" / "episodes.csv");
+    EXPECT_EQ(std::count(kept.begin(), kept.end(), '\n') - 1,
+              std::count_if(episodes.begin(), episodes.end(),
+                            [](const CurvePoint& episode) { return episode.first < 100; }));
+  }
+}
+
+TEST_F(Trainer, RewardsAndObservationsThatOverflowDiverge) {
+  // Finite numbers whose sums or squares are not.
+  struct Huge final : Env {
+    Huge(double reward, double observation) : reward(reward), observation(observation) {}
+    const EnvSpec& Spec() const override { return env.Spec(); }
+    void Reset(Rng& rng, std::span<double> obs) override { env.Reset(rng, obs); }
+    StepResult Step(std::span<const double> a, std::span<double> obs) override {
+      StepResult result = env.Step(a, obs);
+      obs[0] += observation;
+      return {result.reward + reward, false, result.truncated};
+    }
+    void Visit(StateVisitor& v, const std::string& prefix) override { env.Visit(v, prefix); }
+    double reward, observation;
+    FakeEnv env;
+  };
+  config_.eval_every = 0;
+  for (const auto& [reward, observation, message] :
+       {std::tuple{1e308, 0.0, "Fake-v0: the return of worker 0 is inf at step 2 of the episode"},
+        {0.0, 1e200, "Fake-v0: normalizer.var is not finite after the update at step 10"}}) {
+    parts_.make_env = [reward = reward, observation = observation](int) {
+      return std::make_unique<Huge>(reward, observation);
+    };
+    const std::string run = Concat(reward);
+    try {
+      Start(run);
+      ADD_FAILURE() << run << " did not diverge";
+    } catch (const DivergedError& e) {
+      EXPECT_STREQ(e.what(), message);
+    }
+    EXPECT_EQ(ReadRecord(dir_ / (run + ".json")).status, RunStatus::kDiverged);
+  }
 }
 
 TEST_F(Trainer, ShowsOneLineOnATerminalAndPlainLinesElsewhere) {
