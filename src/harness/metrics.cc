@@ -27,14 +27,14 @@ CsvLog::CsvLog(std::filesystem::path path, std::string header)
     : path_(std::move(path)), header_(std::move(header)) {}
 
 void CsvLog::Append(const std::string& line) {
-  out_ << line;
+  pending_ += line;
   bytes_ += static_cast<std::int64_t>(line.size());
   hash_ = std::bit_cast<std::int64_t>(Fnv1a(line, std::bit_cast<std::uint64_t>(hash_)));
 }
 
 void CsvLog::Create() {
-  out_.open(path_, std::ios::binary | std::ios::trunc);
-  Check(out_.is_open(), path_.string(), ": cannot be created");
+  WriteFileAtomically(path_, "");
+  pending_.clear();
   bytes_ = 0;
   hash_ = std::bit_cast<std::int64_t>(Fnv1a(""));
   Append(header_ + "\n");
@@ -51,8 +51,7 @@ void CsvLog::Resume() {
   Check(kept.starts_with(header_ + "\n"), path_.string(), ": its columns are not ", header_,
         ": it was begun by another version of the program");
   std::filesystem::resize_file(path_, static_cast<std::uintmax_t>(bytes_));
-  out_.open(path_, std::ios::binary | std::ios::app);
-  Check(out_.is_open(), path_.string(), ": cannot be opened for writing");
+  AppendToFile(path_, "");  // an error of writing shows before the first step
 }
 
 void CsvLog::Row(const std::vector<std::string>& cells) {
@@ -62,8 +61,8 @@ void CsvLog::Row(const std::vector<std::string>& cells) {
 }
 
 void CsvLog::Flush() {
-  out_.flush();
-  Check(out_.good(), path_.string(), ": cannot write");
+  AppendToFile(path_, pending_);
+  pending_.clear();
   SyncFile(path_);
 }
 

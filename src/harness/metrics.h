@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <span>
 #include <string>
 #include <utility>
@@ -28,7 +27,7 @@ class CsvLog {
   void Resume();
   /// Appends a row of ready cells.
   void Row(const std::vector<std::string>& cells);
-  /// Brings all rows to the disk. Throws Error when a write failed.
+  /// Brings all rows to the disk. Throws Error with the system's reason when it cannot.
   void Flush();
 
   /// `<prefix>.bytes`, `<prefix>.hash`.
@@ -39,8 +38,8 @@ class CsvLog {
 
   std::filesystem::path path_;
   std::string header_;
-  std::ofstream out_;
-  std::int64_t bytes_ = 0;  // written so far
+  std::string pending_;     // rows that are not in the file yet
+  std::int64_t bytes_ = 0;  // of all rows so far
   std::int64_t hash_ = 0;   // Fnv1a of them
 };
 
