@@ -6,6 +6,7 @@
 # Task i runs line i; with --chunk N it runs the N lines up to line i N one after the other, so that an
 # array of many lines stays below the site's limit (MaxArraySize of `scontrol show config`). All other
 # arguments are sbatch's. The lines are submitted with the script: lists made later do not matter to it.
+# A run that has ended is left as it is, so that a task that is queued again goes on where it was.
 # A run that was cancelled, or cut off by its time limit, goes on from its last checkpoint when what
 # `jobs` then prints is submitted.
 set -euo pipefail
@@ -15,10 +16,11 @@ if [ "${1:-}" = --chunk ]; then
   chunk=${2:-}
   shift 2 || true
 fi
-if ! [[ $chunk =~ ^[1-9][0-9]*$ ]]; then
+if ! [[ $chunk =~ ^0*[1-9][0-9]{0,8}$ ]]; then
   echo "slurm_array: --chunk wants a number of lines, not '$chunk'" >&2
   exit 2
 fi
+chunk=$((10#$chunk))
 mapfile -t lines
 if [ ${#lines[@]} -eq 0 ]; then
   echo "slurm_array: no lines, nothing to run" >&2

@@ -24,6 +24,10 @@ PpoRollout::PpoRollout(const AlgorithmInput& in, int n_critics)
       bootstrap_(in.switches.timelimit == Fidelity::kPaper),
       not_initial_(std::size_t(N_), 0),
       order_(std::size_t(N_) * std::size_t(T_)) {
+  if (order_.size() < 2) {
+    throw ConfigError(Concat(in.hyper->Origin("rollout"), ": 'rollout' is 1 with one worker; ",
+                             "advantages are normalised over at least two samples"));
+  }
   batch.Resize(in.S, in.A, Index(N_) * T_);
   mask = MatD::Ones(N_, T_);
   critics.assign(std::size_t(n_critics), CriticStream(N_, T_));

@@ -8,11 +8,16 @@
 #include <csignal>
 #include <cstdio>
 #include <iostream>
+#include <limits>
+#include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "base/align.h"
+#include "base/decimal.h"
 #include "base/files.h"
+#include "base/printable.h"
 #include "base/stats.h"
 #include "env/pairs.h"
 #include "env/replay.h"
@@ -29,13 +34,52 @@
 namespace o2v {
 namespace {
 
+// ---- numbers; by the rules of --set, as CLI11's own would be octal or hexadecimal at times
+
+/// An option whose text `read` turns into a number. `what` it must be is for messages.
+template <typename Value, typename Read>
+CLI::Option* AddNumber(CLI::App& app, const std::string& name, Value& value, const Read& read,
+                       const std::string& what, const std::string& help) {
+  const auto take = [&value, read, name, what](const std::string& text) {
+    const auto x = read(text);
+    if (!x) throw ConfigError(Concat(name, ": '", text, "' is not ", what));
+    value = Value(*x);
+  };
+  return app.add_option_function<std::string>(name, take, help)->type_name("NUMBER");
+}
+
+/// A whole number in [low, high].
+template <typename Value>
+CLI::Option* AddWhole(CLI::App& app, const std::string& name, Value& value, std::int64_t low,
+                      std::int64_t high, const std::string& help) {
+  const auto read = [low, high](const std::string& text) {
+    const auto x = ReadWhole(text);
+    return x && *x >= low && *x <= high ? x : std::nullopt;
+  };
+  return AddNumber(app, name, value, read, Concat("a whole number in [", low, ", ", high, "]"),
+                   help);
+}
+
+/// A finite number from `low` on.
+CLI::Option* AddReal(CLI::App& app, const std::string& name, double& value, double low,
+                     const char* kind, const std::string& help) {
+  const auto read = [low](const std::string& text) {
+    const auto x = ReadReal(text);
+    return x && *x >= low ? x : std::nullopt;
+  };
+  return AddNumber(app, name, value, read, Concat("a ", kind, " finite number"), help);
+}
+
+constexpr int kMaxInt = std::numeric_limits<int>::max();
+constexpr std::int64_t kMaxWhole = std::numeric_limits<std::int64_t>::max();
+
 // Set by SIGINT and SIGTERM: a handler can reach nothing else.
 volatile std::sig_atomic_t stop_signal = 0;
 
 /// Options that name a task and a method, of `train`, `eval`, `forward` and `interpret`.
 struct RunOptions {
   RunRequest request;
-  std::string config;
+  std::optional<std::string> config;
 
   void Add(CLI::App& app) {
     app.add_option("--task", request.task, "task id or pair, see `list tasks`; A,B: A, then B");
@@ -99,8 +143,9 @@ void AddTrain(CLI::App& app) {
   auto opt = std::make_shared<Options>();
   CLI::App* train = app.add_subcommand("train", "one run into one folder");
   opt->Add(*train);
-  train->add_option("--seed", opt->request.seed, "seed of all random streams (default 0)");
-  train->add_option("--steps", opt->request.steps, "environment steps of all workers");
+  AddWhole(*train, "--seed", opt->request.seed, 0, kMaxWhole,
+           "seed of all random streams (default 0)");
+  AddWhole(*train, "--steps", opt->request.steps, 1, kMaxWhole, "environment steps of all workers");
   train->add_option("--out", opt->out, "folder of the run")->required();
   train->add_option("--config", opt->config,
                     "a .toml file, or the name of an embedded one, below --set and the options");
@@ -112,7 +157,7 @@ void AddTrain(CLI::App& app) {
       "--steps 200000 --out runs/b\n"
       "  option2vec train --config runs/a/config.toml --out runs/a --resume");
   train->callback([opt] {
-    if (!opt->config.empty()) opt->request.config = OpenConfig(opt->config);
+    if (opt->config) opt->request.config = OpenConfig(*opt->config);
     const RunConfig config = ResolveRun(opt->request);
     std::signal(SIGINT, [](int signal) { stop_signal = signal; });
     std::signal(SIGTERM, [](int signal) { stop_signal = signal; });
@@ -171,13 +216,11 @@ void AddEval(CLI::App& app) {
   eval->add_option("--checkpoint", opt->checkpoint, "last.ckpt of a run, or a foreign file")
       ->required();
   opt->Add(*eval);
-  eval->add_option("--episodes", opt->episodes, "whole episodes")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+  AddWhole(*eval, "--episodes", opt->episodes, 1, kMaxInt, "whole episodes")->default_str("10");
   eval->add_option("--action", opt->action, "sample: from the Gaussian; mean: its mean")
       ->check(CLI::IsMember({"sample", "mean"}))
       ->capture_default_str();
-  eval->add_option("--seed", opt->seed, "of the episodes")->capture_default_str();
+  AddWhole(*eval, "--seed", opt->seed, 0, kMaxWhole, "of the episodes")->default_str("0");
   eval->footer(
       "Task, method, fidelity and --set are needed only where the file does not say them. After a\n"
       "transfer run --task chooses one of its tasks; the last one is the default.\n"
@@ -235,17 +278,17 @@ void AddInterpret(CLI::App& app) {
       app.add_subcommand("interpret", "what the dimensions of Option2Vec's embedding do");
   interpret->add_option("run", opt->run, "folder of a run, or a checkpoint file")->required();
   opt->Add(*interpret);
-  interpret->add_option("--episodes", opt->episodes, "whole episodes")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  interpret->add_option("--delta", opt->delta, "by which a dimension is perturbed")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  interpret->add_option("--seed", opt->seed, "of the episodes")->capture_default_str();
+  AddWhole(*interpret, "--episodes", opt->episodes, 1, kMaxInt, "whole episodes")
+      ->default_str("10");
+  AddReal(*interpret, "--delta", opt->delta, std::numeric_limits<double>::min(), "positive",
+          "by which a dimension is perturbed")
+      ->default_str(Decimal(kDelta));
+  AddWhole(*interpret, "--seed", opt->seed, 0, kMaxWhole, "of the episodes")->default_str("0");
   interpret->add_option(
       "--out", opt->out,
       "CSV (default results/interpret/<fidelity>/<task>/option2vec/seed-NNN.csv "
-      "of the run's own);\nhow it was made stands beside it, with the ending .json");
+      "of the run's own);\nhow it was made stands beside it, with the ending .json. Files that are "
+      "there are replaced\nonly where an earlier interpretation wrote them");
   interpret->footer(
       "A row a dimension d: W_o(d, k); the mean over the visited states of d mu_a / d o_hat_d, "
       "o_hat the\nembedding of the option executed there; the mean change of mu_a by "
@@ -264,18 +307,17 @@ void AddInterpret(CLI::App& app) {
     if (opt->out.empty() && !metadata.contains("config")) {
       throw ConfigError(file.string() + ": does not say of which run it is; --out is needed");
     }
-    if (opt->out.extension() == ".json") {
-      throw ConfigError(opt->out.string() +
-                        ": a CSV is written there; .json is the file beside it");
-    }
     const std::string& task = policy.env->Spec().id;
     const std::filesystem::path out =
         opt->out.empty() ? InterpretationPath(policy.config, task) : opt->out;
     if (out.has_parent_path()) std::filesystem::create_directories(out.parent_path());
+    RequireInterpretationPlace(out);
     const Interpretation found = Interpret(*policy.algorithm, policy.normalizer, *policy.env,
                                            opt->episodes, opt->delta, opt->seed);
-    WriteFileAtomically(std::filesystem::path(out).replace_extension(".json"),
-                        InterpretationJson(found, metadata, task, opt->episodes, opt->seed));
+    if (const auto json = BesideInterpretation(out)) {
+      WriteFileAtomically(*json,
+                          InterpretationJson(found, metadata, task, opt->episodes, opt->seed));
+    }
     WriteFileAtomically(out, InterpretationCsv(found));
     std::cout << out.string() << ": " << found.W_o.rows() << " dimensions, " << found.states
               << " states of " << opt->episodes << " episodes on " << task << "\n";
@@ -311,9 +353,9 @@ void AddReplay(CLI::App& app, int& exit_code) {
                    "target0..")
       ->required();
   replay->add_option("--out", opt->out, "our trajectory, same columns");
-  replay->add_option("--tolerance", opt->tolerance, "largest |a - b| / max(1, |b|)")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
+  AddReal(*replay, "--tolerance", opt->tolerance, 0, "non-negative",
+          "largest |a - b| / max(1, |b|)")
+      ->default_str(Decimal(opt->tolerance));
   replay->footer(
       "A row with step 0 is injected as the state. Exit code 1 on FAIL.\n"
       "Example:\n  option2vec replay --task Hopper-v2 --trajectory hopper.csv --out ours.csv");
@@ -341,15 +383,15 @@ void AddRecord(CLI::App& app) {
       "Example:\n  option2vec record results/quick/paper/*/ppo/seed-000");
   record->callback([runs] {
     for (const std::string& run : *runs) {
-      const std::filesystem::path dir(run);
+      const std::filesystem::path dir = FolderPath(run);
       const auto manifest = ReadManifest(dir);
       if (!manifest ||
           (manifest->status != RunStatus::kDone && manifest->status != RunStatus::kDiverged)) {
         throw ConfigError(run + ": not the folder of a finished run");
       }
-      const std::string config = (dir / "config.toml").string();
-      WriteRecord(dir, ReadFile(dir / "manifest.json"),
-                  ParseRunConfig(ReadFile(config), config).steps);
+      const std::string path = (dir / "config.toml").string(), config = ReadFile(path);
+      RequireRecordPlace(dir, config, /*begun=*/true);
+      WriteRecord(dir, ReadFile(dir / "manifest.json"), ParseRunConfig(config, path).steps);
     }
   });
 }
@@ -357,7 +399,7 @@ void AddRecord(CLI::App& app) {
 /// Options that name a grid of runs, of `jobs` and `progress`.
 struct GridOptions {
   JobQuery query;
-  std::string seeds;
+  std::optional<std::string> seeds;
 
   void Add(CLI::App& app) {
     app.add_option("experiments", query.configs, "a .toml file, or quick, single_task, ...")
@@ -371,7 +413,7 @@ struct GridOptions {
     app.add_option("--results", query.results, "folder of all results")->capture_default_str();
   }
   std::vector<Job> List() {
-    if (!seeds.empty()) query.seeds = ParseSeeds(seeds);
+    if (seeds) query.seeds = ParseSeeds(*seeds);
     return ListJobs(query);
   }
 };
@@ -390,7 +432,7 @@ void AddJobs(CLI::App& app, const std::string& program) {
       if (!job.finished) {
         std::cout << job.command << "\n";
       } else if (job.old) {
-        std::cerr << job.dir.string() << ": by an older revision of the method\n";
+        std::cerr << Printable(job.dir.string()) << ": by an older revision of the method\n";
       }
     }
   });
@@ -403,9 +445,7 @@ void AddProgress(CLI::App& app) {
   auto opt = std::make_shared<Options>();
   CLI::App* progress = app.add_subcommand("progress", "how far the runs of experiments have come");
   opt->Add(*progress);
-  progress->add_option("--at-once", opt->at_once, "runs at a time")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+  AddWhole(*progress, "--at-once", opt->at_once, 1, kMaxInt, "runs at a time")->default_str("1");
   progress->footer(
       "The time left is what finished runs of the same kind took.\n"
       "Example:\n  option2vec progress single_task transfer --fidelity paper --at-once 2");
@@ -446,27 +486,39 @@ int Main(int argc, char** argv) {
   AddJobs(app, argv[0]);
   AddProgress(app);
   AddSummary(app);
-  auto fail = [](const std::exception& e, int code) {
-    std::cerr << "option2vec: " << e.what() << "\n";
+  const auto fail = [](const std::exception& e, int code) {
+    std::cerr << "option2vec: " << Printable(e.what()) << "\n";
     return code;
   };
+  // What a command prints is written in one go when it ends, so that a loss is seen.
+  std::ostringstream text;
+  std::streambuf* const own = std::cout.rdbuf(text.rdbuf());
   try {
     app.parse(argc, argv);
-    return exit_code;
   } catch (const CLI::Success& e) {  // --help
-    return app.exit(e);
+    exit_code = app.exit(e);
   } catch (const CLI::ParseError& e) {
-    return fail(e, 2);
+    exit_code = fail(e, 2);
   } catch (const ConfigError& e) {
-    return fail(e, 2);
+    exit_code = fail(e, 2);
   } catch (const DivergedError& e) {
-    return fail(e, 3);
+    exit_code = fail(e, 3);
   } catch (const std::exception& e) {
-    return fail(e, 1);
+    exit_code = fail(e, 1);
   }
+  std::cout.rdbuf(own);
+  try {
+    WriteAll(STDOUT_FILENO, "standard output", text.str());
+  } catch (const Error& e) {
+    exit_code = fail(e, exit_code == 0 ? 1 : exit_code);
+  }
+  return exit_code;
 }
 
 }  // namespace
 }  // namespace o2v
 
-int main(int argc, char** argv) { return o2v::Main(argc, argv); }
+int main(int argc, char** argv) {
+  o2v::OpenStandardStreams();
+  return o2v::Main(argc, argv);
+}

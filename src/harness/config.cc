@@ -12,6 +12,7 @@
 #include <type_traits>
 #include <variant>
 
+#include "base/decimal.h"
 #include "base/files.h"
 #include "base/names.h"
 #include "embedded/configs.h"
@@ -223,7 +224,9 @@ double ToReal(std::string_view key, const Scalar& scalar) {
 
 std::int64_t ToInt(std::string_view key, const Scalar& scalar, std::int64_t low,
                    std::int64_t high = std::numeric_limits<std::int64_t>::max()) {
-  const auto* x = std::get_if<std::int64_t>(&scalar.value);
+  std::optional<std::int64_t> x;
+  if (const auto* whole = std::get_if<std::int64_t>(&scalar.value)) x = *whole;
+  if (const auto* real = std::get_if<double>(&scalar.value)) x = Whole(*real);  // 1e3
   if (!x || *x < low || *x > high) {
     Mistyped(key, scalar, Concat("a whole number in [", low, ", ", high, "]"));
   }
@@ -338,15 +341,8 @@ Scope CheckedScope(const Table& run, const std::string& where) {
 
 /// `text` of the command line: a whole number, a number, or else a word.
 Scalar FromText(const std::string& text, std::string origin) {
-  const char *begin = text.data(), *end = begin + text.size();
-  auto reads = [&](auto& x) {
-    const auto result = std::from_chars(begin, end, x);
-    return result.ec == std::errc() && result.ptr == end;
-  };
-  std::int64_t whole = 0;
-  if (reads(whole)) return {whole, std::move(origin)};
-  double real = 0;
-  if (reads(real)) return {real, std::move(origin)};
+  if (const auto whole = ReadDecimal<std::int64_t>(text)) return {*whole, std::move(origin)};
+  if (const auto real = ReadReal(text)) return {*real, std::move(origin)};
   return {text, std::move(origin)};
 }
 

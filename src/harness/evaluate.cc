@@ -34,7 +34,7 @@ int ReadIndex(const CsvTable& table, std::size_t row, std::size_t column, int n)
 
 std::vector<EvalEpisode> Evaluate(Algorithm& algorithm, const Normalizer& normalizer, Env& env,
                                   int episodes, bool sample_action, std::uint64_t seed,
-                                  const VisitHook& visit) {
+                                  const VisitHook& visit, const std::function<bool()>& stop) {
   const EnvSpec& spec = env.Spec();
   Rng resets(seed, "eval.reset"), options(seed, "eval.option"), actions(seed, "eval.action");
   VecD raw(spec.S);
@@ -51,6 +51,7 @@ std::vector<EvalEpisode> Evaluate(Algorithm& algorithm, const Normalizer& normal
     env.Reset(resets, obs);
     init[0] = 1;
     for (bool done = false; !done;) {
+      if (stop && stop()) return results;
       normalizer.Apply(raw, state);
       s = state;
       algorithm.OptionPolicy(s, o_prev, init, P);

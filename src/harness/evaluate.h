@@ -23,10 +23,12 @@ using VisitHook = std::function<void(const Mat& s, int o)>;
 
 /// Runs whole episodes with frozen networks and statistics. Options are drawn from the option
 /// policy; actions from the Gaussian, or its mean when `sample_action` is false. The same seed
-/// gives the same episodes: all randomness comes from streams "eval.*" of `seed`.
+/// gives the same episodes: all randomness comes from streams "eval.*" of `seed`. `stop` is asked
+/// before each step; when it says true, the episodes that have ended are returned.
 std::vector<EvalEpisode> Evaluate(Algorithm& algorithm, const Normalizer& normalizer, Env& env,
                                   int episodes, bool sample_action, std::uint64_t seed,
-                                  const VisitHook& visit = {});
+                                  const VisitHook& visit = {},
+                                  const std::function<bool()>& stop = {});
 
 /// Network outputs for given inputs, dropout off. Reads a CSV with the columns s0.. (S, normalised
 /// state), o_prev, init, o (0-based; the option fed to action net and critic), in any order, and

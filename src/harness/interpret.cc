@@ -6,6 +6,7 @@
 
 #include "base/check.h"
 #include "base/csv.h"
+#include "base/files.h"
 #include "harness/evaluate.h"
 #include "harness/jobs.h"
 #include "harness/manifest.h"
@@ -13,6 +14,19 @@
 namespace o2v {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+constexpr const char* kFirstColumn = "dimension";
+
+/// Whether InterpretationJson wrote it.
+bool IsInterpretation(const std::string& json) {
+  const auto in = nlohmann::json::parse(json, nullptr, /*allow_exceptions=*/false);
+  return in.is_object() && in.contains("commit") && in.contains("episodes") &&
+         in.contains("states");
+}
+
+}  // namespace
 
 Interpretation Interpret(Algorithm& algorithm, const Normalizer& normalizer, Env& env, int episodes,
                          double delta, std::uint64_t seed) {
@@ -49,7 +63,7 @@ std::string InterpretationCsv(const Interpretation& x) {
   const std::pair<const char*, const MatD*> parts[] = {
       {"embedding_", &x.W_o}, {"effect_", &x.effect}, {"perturbed_", &x.perturbed}};
   CsvTable table;
-  table.columns = {"dimension"};
+  table.columns = {kFirstColumn};
   for (const auto& [name, part] : parts) {
     for (Index i = 0; i < part->cols(); ++i) table.columns.push_back(Concat(name, i));
   }
@@ -89,6 +103,27 @@ fs::path InterpretationPath(const RunConfig& config, const std::string& task) {
   }
   return fs::path("results") / "interpret" / variant / task / config.algorithm /
          (SeedFolder(config.seed) + ".csv");
+}
+
+std::optional<fs::path> BesideInterpretation(const fs::path& csv) {
+  if (IsStream(csv)) return std::nullopt;
+  return fs::path(csv).replace_extension(".json");
+}
+
+void RequireInterpretationPlace(const fs::path& csv) {
+  if (csv.extension() == ".json") {
+    throw ConfigError(csv.string() + ": a CSV is written there; .json is the file beside it");
+  }
+  const auto json = BesideInterpretation(csv);
+  if (!json) return;
+  for (const fs::path& path : {csv, *json}) {
+    RequireWritable(path);
+    if (!fs::exists(path)) continue;
+    const std::string text = ReadFile(path);
+    if (path == csv ? !text.starts_with(Concat(kFirstColumn, ",")) : !IsInterpretation(text)) {
+      throw ConfigError(path.string() + ": is not of an interpretation; move it away first");
+    }
+  }
 }
 
 fs::path FindCheckpoint(const fs::path& run) {

@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "algo/algorithm.h"
@@ -50,6 +51,14 @@ std::string InterpretationJson(const Interpretation& interpretation, const Metad
 /// Where the figure and the report look for the interpretation of a run on a task:
 /// results/interpret/<fidelity>[-<switch>=<value>]/<task>/<method>/seed-NNN.csv
 std::filesystem::path InterpretationPath(const RunConfig& config, const std::string& task);
+
+/// The file beside the CSV of an interpretation, how it was made; nothing beside a device or a
+/// pipe.
+std::optional<std::filesystem::path> BesideInterpretation(const std::filesystem::path& csv);
+
+/// Throws ConfigError unless both files can be written, and each that is there is one of an
+/// interpretation, which is replaced.
+void RequireInterpretationPlace(const std::filesystem::path& csv);
 
 /// The newest checkpoint of a run: last.ckpt in its folder, or the file itself. Throws ConfigError
 /// when there is none.

@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cstdio>
 #include <map>
 #include <set>
 #include <string_view>
 
 #include "base/check.h"
-#include "base/files.h"
+#include "base/decimal.h"
 #include "harness/record.h"
 
 namespace o2v {
@@ -29,21 +28,11 @@ std::string Quoted(const std::string& word) {
 
 /// Marks a run that is finished, by its record: the folder may be on another machine.
 void MarkFinished(Job& job) {
-  const fs::path record = RecordPath(job.dir, ".json");
-  if (!fs::exists(record)) return;
-  if (const fs::path csv = RecordPath(job.dir, ".csv"); !fs::exists(csv)) {
-    throw ConfigError(Concat(csv.string(), ": missing; a record is a pair of files, this and ",
-                             record.filename().string(), ": write both with `option2vec record ",
-                             job.dir.string(), "`, or move the other away to run it again"));
-  }
-  const Record run = ReadRecord(record);
-  if (run.config != ToToml(job.config)) {
-    throw ConfigError(Concat(record.string(), ": this run was finished with another ",
-                             "configuration; move it away to run it again"));
-  }
-  job.finished = run.status;
-  job.cpu_seconds = run.cpu_seconds;
-  job.old = run.revision < FindAlgorithm(job.config.algorithm).revision;
+  const std::optional<Record> record = FindRecord(job.dir, ToToml(job.config));
+  if (!record) return;
+  job.finished = record->status;
+  job.cpu_seconds = record->cpu_seconds;
+  job.old = record->revision < FindAlgorithm(job.config.algorithm).revision;
 }
 
 }  // namespace
@@ -212,26 +201,26 @@ std::string ToString(const Progress& progress, int at_once) {
 std::vector<std::uint64_t> ParseSeeds(const std::string& text) {
   constexpr std::uint64_t kMost = 10'000;  // seeds in one range, against a slip of the finger
   std::vector<std::uint64_t> seeds;
-  const char* at = text.data();
-  const char* const end = at + text.size();
-  auto number = [&] {
-    std::uint64_t x = 0;
-    const auto [stop, error] = std::from_chars(at, end, x);
-    if (error != std::errc() || x > INT64_MAX) {
+  const auto number = [&](std::string_view digits) {
+    const auto x = ReadWhole(digits);
+    if (!x || *x < 0) {
       throw ConfigError(Concat("seeds '", text, "': expected a list such as 0-4,7"));
     }
-    at = stop;
-    return x;
+    return static_cast<std::uint64_t>(*x);
   };
-  auto skip = [&](char c) { return at != end && *at == c && ++at; };
-  do {
-    const std::uint64_t first = number(), last = skip('-') ? number() : first;
+  const std::string_view list = text;
+  for (std::size_t begin = 0, end; begin <= list.size(); begin = end + 1) {
+    end = std::min(list.find(',', begin), list.size());
+    const std::string_view range = list.substr(begin, end - begin);
+    const std::size_t dash = range.find('-');
+    const std::uint64_t first = number(range.substr(0, dash));
+    const std::uint64_t last =
+        dash == std::string_view::npos ? first : number(range.substr(dash + 1));
     if (last < first || last - first >= kMost) {
       throw ConfigError(Concat("seeds '", text, "': bad range ", first, "-", last));
     }
     for (std::uint64_t seed = first; seed <= last; ++seed) seeds.push_back(seed);
-  } while (skip(','));
-  if (at != end) throw ConfigError(Concat("seeds '", text, "': expected a list such as 0-4,7"));
+  }
   return seeds;
 }
 

@@ -13,6 +13,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
+constexpr std::string_view kFirstColumns = "step,return_20";
 constexpr std::int64_t kGrid = 10'000;  // [environment steps] ours: 100 rows a million steps
 
 /// Columns of an option in an updates.csv.
@@ -55,14 +56,14 @@ OptionCount CountOption(const CsvTable& updates, const OptionColumns& option, st
 }  // namespace
 
 std::filesystem::path RecordPath(std::filesystem::path dir, const char* ending) {
-  return dir += ending;
+  return FolderPath(dir) += ending;
 }
 
 std::string RecordCsv(std::span<const CurvePoint> episodes, const CsvTable& updates,
                       std::int64_t steps) {
   const std::vector<CurvePoint> curve = SmoothedReturns(episodes);
   const std::vector<OptionColumns> options = FindOptions(updates);
-  std::string text = "step,return_20";
+  std::string text(kFirstColumns);
   for (const OptionColumns& option : options) text += "," + updates.columns[option.usage];
   for (const OptionColumns& option : options) text += "," + updates.columns[option.duration];
   text += "\n";
@@ -120,6 +121,49 @@ Record ReadRecord(const std::filesystem::path& path) {
             in.at("config").get<std::string>()};
   } catch (const std::exception& e) {
     throw Error(Concat(path.string(), ": cannot be read: ", e.what()));
+  }
+}
+
+std::optional<Record> FindRecord(const std::filesystem::path& dir, const std::string& config) {
+  const std::filesystem::path json = RecordPath(dir, ".json");
+  std::error_code error;  // a name that is too long is nobody's
+  if (!std::filesystem::exists(json, error)) return std::nullopt;
+  if (const auto csv = RecordPath(dir, ".csv"); !std::filesystem::exists(csv)) {
+    throw ConfigError(Concat(csv.string(), ": missing; a record is a pair of files, this and ",
+                             json.filename().string(), ": write both with `option2vec record ",
+                             dir.string(), "`, or move the other away to run it again"));
+  }
+  const Record record = ReadRecord(json);
+  if (record.config != config) {
+    throw ConfigError(Concat(json.string(), ": this run was finished with another ",
+                             "configuration; move it away to run it again"));
+  }
+  return record;
+}
+
+void RequireRecordPlace(const std::filesystem::path& dir, const std::string& config, bool begun) {
+  constexpr std::size_t kLongestName = 255;  // [bytes] of most file systems
+  const std::filesystem::path json = RecordPath(dir, ".json"), csv = RecordPath(dir, ".csv");
+  const std::size_t longest = json.filename().string().size() + sizeof ".tmp" - 1;
+  if (longest > kLongestName) {
+    throw ConfigError(Concat(dir.string(), ": its record's name would have ", longest,
+                             " bytes, more than ", kLongestName));
+  }
+  const auto own = [&](const std::filesystem::path& path) {
+    try {
+      return path == csv ? ReadFile(path).starts_with(kFirstColumns)
+                         : ReadRecord(path).config == config;
+    } catch (const Error&) {
+      return false;
+    }
+  };
+  std::error_code error;
+  for (const std::filesystem::path& path : {json, csv}) {
+    if (!std::filesystem::exists(std::filesystem::symlink_status(path, error))) continue;
+    if (!begun || !std::filesystem::is_regular_file(path) || !own(path)) {
+      throw ConfigError(path.string() +
+                        ": is in the place of this run's record; move it away first");
+    }
   }
 }
 

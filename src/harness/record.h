@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -13,7 +14,8 @@
 
 namespace o2v {
 
-/// A file of the record of the run in the folder `dir`; `ending` is ".csv" or ".json".
+/// A file of the record of the run in the folder `dir`, see FolderPath; `ending` is ".csv" or
+/// ".json".
 std::filesystem::path RecordPath(std::filesystem::path dir, const char* ending);
 
 /// The record of a finished run, as CSV on a grid of 10 000 steps up to `steps` (and `steps`
@@ -46,5 +48,14 @@ struct Record {
 };
 /// Reads a file of RecordJson. Throws Error when it cannot be read.
 Record ReadRecord(const std::filesystem::path& path);
+
+/// The record of the run of this configuration in `dir`; nothing when there is none. Throws
+/// ConfigError for half a record and for that of another configuration.
+std::optional<Record> FindRecord(const std::filesystem::path& dir, const std::string& config);
+
+/// Throws ConfigError unless the record of this run can be written beside `dir`: the names fit, and
+/// no file there is somebody's own. `begun`: the run may have been killed while it wrote its
+/// record.
+void RequireRecordPlace(const std::filesystem::path& dir, const std::string& config, bool begun);
 
 }  // namespace o2v

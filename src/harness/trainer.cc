@@ -5,14 +5,15 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <ctime>
 #include <deque>
-#include <fstream>
 #include <iomanip>
 #include <ostream>
 #include <sstream>
+#include <system_error>
 
 #include "base/check.h"
 #include "base/files.h"
@@ -50,17 +51,26 @@ bool Crossed(std::int64_t every, std::int64_t before, std::int64_t now) {
 class FolderLock {
  public:
   explicit FolderLock(const fs::path& dir) : fd_(::open(dir.c_str(), O_RDONLY | O_CLOEXEC)) {
-    Check(fd_ >= 0, dir.string(), ": cannot be opened");
-    if (::flock(fd_, LOCK_EX | LOCK_NB) != 0) {
-      ::close(fd_);
-      throw ConfigError(dir.string() + ": another process trains in this folder");
-    }
+    if (fd_ < 0) throw ConfigError(Concat(dir.string(), ": cannot be opened: ", Reason(errno)));
+    int result = 0;
+    do {
+      result = ::flock(fd_, LOCK_EX | LOCK_NB);
+    } while (result != 0 && errno == EINTR);
+    if (result == 0) return;
+    const int error = errno;
+    ::close(fd_);
+    throw ConfigError(Concat(dir.string(), ": ",
+                             error == EWOULDBLOCK
+                                 ? "another process trains in this folder"
+                                 : "cannot be locked for this process: " + Reason(error)));
   }
   ~FolderLock() { ::close(fd_); }
   FolderLock(const FolderLock&) = delete;
   FolderLock& operator=(const FolderLock&) = delete;
 
  private:
+  static std::string Reason(int error) { return std::generic_category().message(error); }
+
   int fd_;
 };
 
@@ -73,35 +83,49 @@ void RequireSameConfig(const fs::path& path, const std::string& wanted) {
     const bool more_b = static_cast<bool>(std::getline(b, line_b));
     if (!more_a && !more_b) return;
     if (more_a && more_b && line_a == line_b) continue;
+    if (line_a == line_b + "\r") {
+      throw ConfigError(Concat(path.string(), ":", line, ": ends in CR LF; the run was started ",
+                               "with LF, give the file its line ends back"));
+    }
     throw ConfigError(Concat(path.string(), ":", line, ": this run was started with '",
                              more_a ? line_a : "(nothing)", "', not '",
                              more_b ? line_b : "(nothing)", "'"));
   }
 }
 
-/// Accepts or refuses a folder; writes config.toml into a new one.
-void PrepareFolder(const fs::path& dir, const std::string& config, bool resume,
+/// What a run that has ended says when it is asked to go on: nothing is left to do.
+RunStatus Ended(const fs::path& dir, RunStatus status, std::ostream& progress) {
+  if (status == RunStatus::kDiverged) throw DivergedError(dir.string() + ": this run has diverged");
+  progress << dir.string() << ": this run is done, nothing is left to do" << std::endl;
+  return status;
+}
+
+/// Accepts or refuses a folder that is locked; writes config.toml into a new one. True when the run
+/// has ended and nothing is left to do.
+bool PrepareFolder(const fs::path& dir, const std::string& config, bool resume,
                    const std::optional<Manifest>& manifest) {
   const fs::path path = dir / "config.toml";
-  if (!fs::exists(path)) {
+  const bool begun = fs::exists(path);
+  if (!begun) {
     for (const auto& entry : fs::directory_iterator(dir)) {
       if (entry.path().filename() != "config.toml.tmp") {
         throw ConfigError(Concat(dir.string(), ": holds ", entry.path().filename().string(),
                                  " but no config.toml: not a folder of a run"));
       }
     }
-    if (const fs::path record = RecordPath(dir, ".json"); fs::exists(record)) {
-      throw ConfigError(record.string() + ": the record of a finished run; move it away first");
-    }
-    WriteFileAtomically(path, config);
-    return;
   }
   const RunStatus status = manifest ? manifest->status : RunStatus::kRunning;
-  if (status == RunStatus::kDone || status == RunStatus::kDiverged) {
-    throw ConfigError(Concat(dir.string(), ": this run is ", ToString(status)));
+  const bool ended = begun && (status == RunStatus::kDone || status == RunStatus::kDiverged);
+  if (begun && !resume) {
+    throw ConfigError(Concat(dir.string(), ended
+                                               ? ": this run is " + ToString(status)
+                                               : ": holds an unfinished run; go on with --resume"));
   }
-  if (!resume) throw ConfigError(dir.string() + ": holds an unfinished run; go on with --resume");
-  RequireSameConfig(path, config);
+  if (begun) RequireSameConfig(path, config);
+  RequireRecordPlace(dir, config, begun);
+  RequireWritable(RecordPath(dir, ".json"));
+  if (!begun) WriteFileAtomically(path, config);
+  return ended;
 }
 
 /// True when no entry is infinite or NaN: these times zero are NaN. Unlike Eigen's allFinite, in
@@ -156,19 +180,24 @@ class Progress {
 /// timing.csv: appended to by every process that worked on the run.
 class TimingLog {
  public:
-  explicit TimingLog(const fs::path& path)
-      : path_(path), out_(path, std::ios::app | std::ios::ate) {
-    if (out_.tellp() == 0) out_ << "step,wall_s,cpu_s,steps_per_s\n";
+  explicit TimingLog(const fs::path& path) : path_(path) {
+    const std::string text = fs::exists(path) ? ReadFile(path) : "";
+    const std::size_t rows =
+        text.rfind('\n') + 1;  // what a full disk tore off is cut; npos + 1 = 0
+    if (rows < text.size()) fs::resize_file(path, rows);
+    if (rows == 0) AppendToFile(path, "step,wall_s,cpu_s,steps_per_s\n");
   }
   void Row(std::int64_t step, double wall, double cpu, double rate) {
-    out_ << step << "," << wall << "," << cpu << "," << rate << "\n" << std::flush;
-    Check(out_.good(), path_.string(), ": cannot write");
+    AppendToFile(path_, Concat(step, ",", wall, ",", cpu, ",", rate, "\n"));
   }
 
  private:
   fs::path path_;
-  std::ofstream out_;
 };
+
+/// Thrown out of an iteration whose evaluation was stopped. No checkpoint can stand between an
+/// update and its evaluation, so the run goes on from the one before.
+struct StoppedInEvaluation {};
 
 Metadata Describe(const RunConfig& config, const EnvSpec& spec, Algorithm& algorithm,
                   std::int64_t total_steps) {
@@ -326,7 +355,8 @@ class Run {
   void LogEvaluation() {
     const std::unique_ptr<Env> env = parts_.make_env(task_);
     const auto episodes = Evaluate(*algorithm_, env_.normalizer(), *env, config_.eval_episodes,
-                                   /*sample_action=*/true, config_.seed);
+                                   /*sample_action=*/true, config_.seed, {}, hooks_.stop);
+    if (int(episodes.size()) < config_.eval_episodes) throw StoppedInEvaluation();
     int number = 0;
     for (const EvalEpisode& e : episodes) logs_.AddEval(env_.TotalSteps(), number++, e.ret);
   }
@@ -389,20 +419,41 @@ RunParts PartsOf(const RunConfig& config) {
 
 RunStatus Train(const RunConfig& config, const RunParts& parts, const fs::path& dir, bool resume,
                 std::ostream& progress, bool terminal, const RunHooks& hooks) {
-  const fs::path folder = dir.has_filename() ? dir : dir.parent_path();  // "run/" is "run"
+  const fs::path folder = FolderPath(dir);
+  const std::string text = ToToml(config);
   Run run(config, parts, folder, hooks, progress,
           terminal);  // a bad config leaves no folder behind
   std::error_code error;
-  fs::create_directories(folder, error);
+  const bool begun = fs::exists(folder / "config.toml", error);
+  if (!begun && resume) {  // its record is enough, as for `jobs`
+    if (const auto record = FindRecord(folder, text))
+      return Ended(folder, record->status, progress);
+  }
+  if (!begun) RequireRecordPlace(folder, text, begun);
+  const bool made = fs::create_directories(folder, error);
   if (error) throw ConfigError(Concat(folder.string(), ": cannot be made: ", error.message()));
   const FolderLock lock(folder);
   const std::optional<Manifest> before = ReadManifest(folder);
-  PrepareFolder(folder, ToToml(config), resume, before);
+  try {
+    if (PrepareFolder(folder, text, resume, before)) {
+      const bool half = !fs::exists(RecordPath(folder, ".csv"));  // killed before it was whole
+      if (half || !fs::exists(RecordPath(folder, ".json"))) {
+        WriteRecord(folder, ReadFile(folder / "manifest.json"), config.steps);
+      }
+      return Ended(folder, before->status, progress);
+    }
+  } catch (const ConfigError&) {
+    if (made) fs::remove(folder, error);  // empty
+    throw;
+  }
   try {
     run.Start(before);
     const RunStatus status = run.Loop();
     run.Finish(status);
     return status;
+  } catch (const StoppedInEvaluation&) {
+    run.Finish(RunStatus::kStopped);
+    return RunStatus::kStopped;
   } catch (const DivergedError&) {
     run.Finish(RunStatus::kDiverged);
     throw;

@@ -28,17 +28,20 @@ RunParts PartsOf(const RunConfig& config);
 
 /// Moments at which a run can be interrupted from outside; each may be empty.
 struct RunHooks {
-  std::function<bool()> stop;  // asked after each iteration; true ends the run, resumable
+  // Asked after each iteration and each step of an evaluation; true ends the run, resumable.
+  std::function<bool()> stop;
   std::function<void()>
       before_checkpoint;                // the logs are flushed, the checkpoint is still the old one
   std::function<void()> before_rename;  // the new checkpoint is written under its temporary name
 };
 
-/// Trains in the folder `dir` and returns kDone or kStopped.
+/// Trains in the folder `dir` (see FolderPath) and returns kDone or kStopped.
 ///
-/// A folder that another process trains in, that is finished or diverged, that holds something
-/// else, or that is unfinished while `resume` is false is refused with ConfigError, and so is one
-/// whose config.toml differs. With `resume` a folder that does not exist yet is started.
+/// Refused with ConfigError before anything is changed: a folder that another process trains in,
+/// that holds something else or whose config.toml differs, one of a run when `resume` is false, and
+/// files of somebody else in the place of the record. With `resume` a folder that does not exist
+/// yet is started, and a run that has ended, by its folder or its record, is left as it is: kDone
+/// again, or DivergedError again.
 ///
 /// A run diverges where the simulator does, or where an update leaves a statistic, a parameter or
 /// the normaliser not finite. That update is neither logged nor saved: last.ckpt is the last

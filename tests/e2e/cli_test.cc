@@ -111,14 +111,16 @@ TEST_F(Program, ParamsPrintsThePapersRatio) {
   }
 }
 
-TEST_F(Program, TrainsIntoAFolderThatItThenRefuses) {
+TEST_F(Program, TrainsIntoAFolderThatItThenRefusesOrLeavesAsItIs) {
   ASSERT_EQ(Train("--out run").code, 0);
   for (const char* file :
        {"config.toml", "episodes.csv", "updates.csv", "last.ckpt", "timing.csv", "manifest.json"}) {
     EXPECT_TRUE(fs::exists(dir_ / "run" / file)) << file;
   }
   EXPECT_EQ(Train("--out run").code, 2);
-  EXPECT_EQ(Train("--out run --resume").code, 2) << "it is finished";
+  const Outcome again = Train("--out run --resume");
+  EXPECT_EQ(again.code, 0);
+  EXPECT_EQ(again.err, "run: this run is done, nothing is left to do\n");
 }
 
 TEST_F(Program, RunsAgainFromTheConfigThatItWrote) {

@@ -249,11 +249,13 @@ TEST_F(Jobs, EveryExperimentOfTheProgramResolves) {
 TEST(ParseSeeds, ReadsNumbersAndRanges) {
   EXPECT_EQ(ParseSeeds("0-2,7"), (std::vector<std::uint64_t>{0, 1, 2, 7}));
   EXPECT_EQ(ParseSeeds("9223372036854775807").front(), 9223372036854775807u);
+  EXPECT_EQ(ParseSeeds("007,010-011,1e2"), (std::vector<std::uint64_t>{7, 10, 11, 100}));
 }
 
 TEST(ParseSeeds, RefusesEverythingElse) {
-  for (const char* text : {"", ",", "1,", "-1", "3-1", "1-", "a", "1 2", "0-99999999",
-                           "9223372036854775808", "99999999999999999999"}) {
+  for (const char* text :
+       {"", ",", "1,", "-1", "3-1", "1-", "a", "1 2", "0x1", "+1", "0-1-2", "1,,2", "1.5",
+        "0-99999999", "9223372036854775808", "99999999999999999999"}) {
     EXPECT_THROW(ParseSeeds(text), ConfigError) << text;
   }
 }

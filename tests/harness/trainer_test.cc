@@ -1,19 +1,37 @@
 #include "harness/trainer.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/file.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <fcntl.h>
 
+#include <cerrno>
 #include <cmath>
 #include <limits>
 #include <sstream>
 #include <tuple>
 
+#include "base/csv.h"
 #include "fake_run.h"
 #include "harness/checkpoint.h"
 #include "harness/record.h"
+
+namespace {
+int lock_error = 0;  // with which the next flock fails
+}
+
+// The program's own calls, in front of the system's.
+extern "C" int flock(int fd, int operation) {
+  if (lock_error != 0) {
+    errno = lock_error;
+    lock_error = lock_error == EINTR ? 0 : lock_error;
+    return -1;
+  }
+  return int(syscall(SYS_flock, fd, operation));
+}
 
 namespace o2v {
 namespace {
@@ -186,13 +204,135 @@ TEST_F(Trainer, ResumeStartsAFolderThatDoesNotExistYet) {
   EXPECT_EQ(Resume("new"), RunStatus::kDone);
 }
 
-TEST_F(Trainer, RefusesAFinishedFolder) {
+TEST_F(Trainer, RefusesAFinishedFolderUnlessToldToGoOn) {
   Start("run");
-  const std::string expected = (dir_ / "run").string() + ": this run is done";
-  EXPECT_EQ(Refused([&] { Start("run"); }), expected);
-  EXPECT_EQ(Refused([&] { Resume("run"); }), expected);
-  EXPECT_EQ(Refused([&] { Train(config_, parts_, dir_ / "run/", true, progress_, false); }),
-            expected);
+  EXPECT_EQ(Refused([&] { Start("run"); }), (dir_ / "run").string() + ": this run is done");
+}
+
+TEST_F(Trainer, LeavesAFinishedRunAsItIs) {
+  Start("run");
+  const std::string manifest = ReadFile(dir_ / "run" / "manifest.json");
+  for (const char* name : {"run", "run/", "run/."}) {
+    progress_.str("");
+    EXPECT_EQ(Resume(name), RunStatus::kDone);
+    EXPECT_EQ(progress_.str(),
+              (dir_ / "run").string() + ": this run is done, nothing is left to do\n");
+    EXPECT_EQ(ReadFile(dir_ / "run" / "manifest.json"), manifest);
+  }
+  config_.steps = 300;
+  EXPECT_TRUE(Refused([&] { Resume("run"); }).ends_with("'steps = 200', not 'steps = 300'"));
+}
+
+TEST_F(Trainer, LeavesARunAsItIsThatOnlyItsRecordSaysIsFinished) {
+  Start("run");
+  fs::remove_all(dir_ / "run");
+  EXPECT_EQ(Resume("run"), RunStatus::kDone);
+  EXPECT_FALSE(fs::exists(dir_ / "run"));
+  config_.steps = 300;
+  EXPECT_TRUE(Refused([&] { Resume("run"); }).find("another configuration") != std::string::npos);
+  EXPECT_FALSE(fs::exists(dir_ / "run"));
+}
+
+TEST_F(Trainer, WritesTheRecordThatAKilledProcessDidNot) {
+  Start("run");
+  const std::string csv = ReadFile(dir_ / "run.csv"), json = ReadFile(dir_ / "run.json");
+  for (const char* lost : {"run.csv", "run.json"}) {
+    fs::remove(dir_ / lost);
+    EXPECT_EQ(Resume("run"), RunStatus::kDone);
+    EXPECT_EQ(ReadFile(dir_ / "run.csv"), csv) << lost;
+    EXPECT_EQ(ReadFile(dir_ / "run.json"), json) << lost;
+  }
+}
+
+TEST_F(Trainer, LeavesSomebodysFilesBesideTheFolderAlone) {
+  for (const char* name : {"run.csv", "run.json"}) {
+    WriteFileAtomically(dir_ / name, "mine");
+    EXPECT_EQ(
+        Refused([&] { Start("run"); }),
+        (dir_ / name).string() + ": is in the place of this run's record; move it away first");
+    EXPECT_EQ(ReadFile(dir_ / name), "mine");
+    EXPECT_FALSE(fs::exists(dir_ / "run"));
+    fs::remove(dir_ / name);
+  }
+  fs::create_symlink("nowhere", dir_ / "run.csv");
+  EXPECT_NE(Refused([&] { Start("run"); }), "accepted");
+  fs::remove(dir_ / "run.csv");
+  // They may come while the run is stopped.
+  RunHooks hooks;
+  hooks.stop = [] { return true; };
+  Start("run", hooks);
+  for (const char* name : {"run.csv", "run.json"}) {
+    WriteFileAtomically(dir_ / name, "mine");
+    EXPECT_NE(Refused([&] { Resume("run"); }), "accepted") << name;
+    EXPECT_EQ(ReadFile(dir_ / name), "mine");
+    fs::remove(dir_ / name);
+  }
+  // What a process left that was killed while it wrote the record is replaced.
+  WriteFileAtomically(dir_ / "run.csv", "step,return_20\n");
+  EXPECT_EQ(Resume("run"), RunStatus::kDone);
+}
+
+TEST_F(Trainer, RefusesNamesThatItsRecordHasNoRoomFor) {
+  const std::string fits(246, 'n');  // + ".json.tmp" is 255
+  EXPECT_EQ(Start(fits), RunStatus::kDone);
+  EXPECT_TRUE(fs::exists(dir_ / (fits + ".json")));
+  EXPECT_EQ(
+      Refused([&] { Start(fits + "n"); }),
+      (dir_ / (fits + "n")).string() + ": its record's name would have 256 bytes, more than 255");
+  EXPECT_FALSE(fs::exists(dir_ / (fits + "n")));
+}
+
+TEST_F(Trainer, SaysWhyAFolderCannotBeLocked) {
+  fs::create_directory(dir_ / "run");
+  lock_error = ENOLCK;
+  EXPECT_EQ(Refused([&] { Start("run"); }),
+            (dir_ / "run").string() + ": cannot be locked for this process: No locks available");
+  lock_error = EINTR;
+  EXPECT_EQ(Start("run"), RunStatus::kDone);
+}
+
+TEST_F(Trainer, CutsATornRowOfItsTimes) {
+  RunHooks hooks;
+  hooks.stop = [] { return true; };
+  Start("run", hooks);
+  const std::string whole = ReadFile(dir_ / "run" / "timing.csv");
+  AppendToFile(dir_ / "run" / "timing.csv", "20,0.");  // a full disk
+  Resume("run");
+  const CsvTable times = ReadCsv(dir_ / "run" / "timing.csv");
+  ASSERT_EQ(times.Rows(), 20u);
+  EXPECT_TRUE(ReadFile(dir_ / "run" / "timing.csv").starts_with(whole));
+  for (std::size_t row = 0; row < 20; ++row) EXPECT_EQ(times.At(row, 0), 10.0 * double(row + 1));
+}
+
+TEST_F(Trainer, NamesWindowsLineEndsOfAConfig) {
+  RunHooks hooks;
+  hooks.stop = [] { return true; };
+  Start("run", hooks);
+  std::string text = ReadFile(dir_ / "run" / "config.toml");
+  for (std::size_t i = 0; (i = text.find('\n', i)) != std::string::npos; i += 2) {
+    text.replace(i, 1, "\r\n");
+  }
+  WriteFileAtomically(dir_ / "run" / "config.toml", text);
+  EXPECT_TRUE(Refused([&] { Resume("run"); }).find("config.toml:1: ends in CR LF") !=
+              std::string::npos);
+}
+
+TEST_F(Trainer, StopsInTheMiddleOfAnEvaluationAndGoesOn) {
+  Start("whole");
+  // Asked after each of four iterations; then before each step of the evaluation after the fifth,
+  // of two episodes of at most 7 steps.
+  for (int moment = 5; moment <= 8; ++moment) {
+    const std::string name = std::to_string(moment);
+    int asked = 0;
+    RunHooks hooks;
+    hooks.stop = [&] { return ++asked >= moment; };
+    EXPECT_EQ(Start(name, hooks), RunStatus::kStopped);
+    EXPECT_EQ(asked, moment) << "it went on";
+    EXPECT_EQ(ReadManifest(dir_ / name)->status, RunStatus::kStopped);
+    EXPECT_EQ(ReadMetadata(dir_ / name / "last.ckpt").at("total_steps"), "30");
+    EXPECT_EQ(Resume(name), RunStatus::kDone);
+    ExpectSameFiles(name, "whole");
+  }
 }
 
 TEST_F(Trainer, RefusesAnUnfinishedFolderUnlessToldToGoOn) {
@@ -277,7 +417,14 @@ TEST_F(Trainer, KeepsWhatADivergedRunHas) {
   const CsvTable updates = ReadUpdates(dir_ / "run" / "updates.csv");
   ASSERT_EQ(updates.Rows(), 1u);  // of the nine updates before
   EXPECT_EQ(updates.At(0, 0), 90);
-  EXPECT_EQ(Refused([&] { Resume("run"); }), (dir_ / "run").string() + ": this run is diverged");
+  EXPECT_EQ(Refused([&] { Start("run"); }), (dir_ / "run").string() + ": this run is diverged");
+  try {
+    Resume("run");
+    ADD_FAILURE() << "it went on";
+  } catch (const DivergedError& e) {
+    EXPECT_EQ(e.what(), (dir_ / "run").string() + ": this run has diverged");
+  }
+  EXPECT_EQ(ReadManifest(dir_ / "run")->steps, 98);
 }
 
 /// Spoils what the update at `left` = 1 leaves behind.
