@@ -91,6 +91,20 @@ TEST(SampleCategorical, DrawsAtItsProbabilities) {
   }
 }
 
+TEST(SampleCategorical, TakesTheFirstOptionWhosePartsExceedTheUniform) {
+  // Probabilities 1/4, 1/2, 1/4 as 1, 2, 1: the draw is 0 below u = 1/4, 1 below 3/4, else 2.
+  Rng rng(8, "test"), again(8, "test");
+  constexpr int n = 1000;
+  Mat P(3, n);
+  P.colwise() = (Vec(3) << 1, 2, 1).finished();
+  std::vector<int> o(n);
+  SampleCategorical(P, rng, o);
+  for (const int k : o) {
+    const double u = again.Uniform();
+    EXPECT_EQ(k, u < 0.25 ? 0 : u < 0.75 ? 1 : 2) << u;
+  }
+}
+
 TEST(SampleCategorical, NeverDrawsWhatCannotHappen) {
   Rng rng(4, "test");
   Mat P = Mat::Zero(3, 1000);

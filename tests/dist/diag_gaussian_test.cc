@@ -78,6 +78,26 @@ TEST(SampleGaussian, HasItsMeanAndDeviation) {
   }
 }
 
+TEST(SampleGaussian, ShiftsAndScalesBoxMullersNormals) {
+  // a = mu + sigma sqrt(-2 ln(1 - u)) cos(2 pi v), u and v drawn in this order.
+  Rng rng(5, "test"), again(5, "test");
+  Mat mu(2, 3), sigma(2, 3), a;
+  mu << 1, 2, 3, -4, -5, -6;
+  sigma << 0.5, 1, 2, 3, 0.25, 4;
+  SampleGaussian(mu, sigma, rng, a);
+  for (Index i = 0; i < 6; ++i) {
+    const double u = again.Uniform(), v = again.Uniform();
+    const double z = std::sqrt(-2 * std::log(1 - u)) * std::cos(2 * std::numbers::pi * v);
+    EXPECT_NEAR(a.data()[i], double(mu.data()[i]) + double(sigma.data()[i]) * z, 1e-5);
+  }
+  SampleGaussian(mu, sigma.col(1), rng, a);  // one sigma for all columns
+  for (Index i = 0; i < 6; ++i) {
+    const double u = again.Uniform(), v = again.Uniform();
+    const double z = std::sqrt(-2 * std::log(1 - u)) * std::cos(2 * std::numbers::pi * v);
+    EXPECT_NEAR(a.data()[i], double(mu.data()[i]) + (i % 2 ? 0.25 : 1) * z, 1e-5);
+  }
+}
+
 TEST(SampleGaussian, DrawsColumnByColumn) {
   Rng rng(4, "test"), again(4, "test");
   Mat a;

@@ -41,6 +41,32 @@ TEST(RecordCsv, HoldsTheOptionsOfTheUpdatesSinceTheGridStepBefore) {
             "30000,290.5,0.1,0.9,4,9000\n");
 }
 
+TEST(RecordCsv, CountsAnUpdateOnAGridStepToItAndOneBesideItToTheNext) {
+  // Up to 10 000: 9999 steps with option 0, in 99 executions, and the one step of the update that
+  // ends there, with option 1. Up to 20 000: one step of option 1, 9999 of option 0 in 3
+  // executions. Up to 30 000: 10 000 steps of option 1 in 20.
+  const CsvTable updates{
+      "updates.csv",
+      {"step", "usage_0", "usage_1", "duration_0_steps", "duration_1_steps"},
+      {9'999,  1, 0, 101,   0,    //
+       10'000, 0, 1, 0,     1,    //
+       10'001, 0, 1, 0,     1,    //
+       20'000, 1, 0, 3'333, 0,    //
+       30'000, 0, 1, 0,     500}};
+  EXPECT_EQ(RecordCsv(Rising(300), updates, 30'000),
+            "step,return_20,usage_0,usage_1,duration_0_steps,duration_1_steps\n"
+            "10000,90.5,0.9999,0.0001,101,1\n"
+            "20000,190.5,0.9999,0.0001,3333,1\n"
+            "30000,290.5,0,1,,500\n");
+}
+
+TEST(RecordCsv, EndsWithTheLastStepWhereItIsBesideTheGrid) {
+  // The 101st episode ends at 10 100: its mean is that of 82..101.
+  EXPECT_EQ(RecordCsv(Rising(300), {}, 10'001), "step,return_20\n10000,90.5\n10001,90.5\n");
+  EXPECT_EQ(RecordCsv(Rising(300), {}, 10'100), "step,return_20\n10000,90.5\n10100,91.5\n");
+  EXPECT_EQ(RecordCsv(Rising(300), {}, 9'999), "step,return_20\n9999,89.5\n");
+}
+
 TEST(RecordCsv, AddsUpStepsAndExecutionsAsWholeNumbers) {
   // 1 of 3000 steps in 1 execution, 27 of 3000 in 13: 28 of 6000 in 14. The products and quotients
   // of these shares and durations are not all whole. After it an update alone: its own numbers.

@@ -121,6 +121,34 @@ TEST(Dropout, DropsAtItsRateAndScalesTheRest) {
   }
 }
 
+TEST(Dropout, DropsWhereSixteenBitsAreBelowTheProbability) {
+  // 0.2 * 2^16 = 13107.2, so below 0x3333: a byte of 0x33 is decided by the low byte of the next
+  // word, after the words of its block of 512 entries; 0.5 is 0x8000, where the second byte never
+  // drops.
+  for (const auto& [p, first, second] : {std::tuple(0.2, 0x33, 0x33), std::tuple(0.5, 0x80, 0)}) {
+    Rng rng(6, "test"), again(6, "test");
+    Mat mask(37, 41);  // 1517 = 512 + 512 + 493 entries
+    DrawDropoutMask(p, rng, mask);
+    int decided_late = 0;
+    for (Index start = 0; start < mask.size(); start += 512) {
+      const Index n = std::min<Index>(512, mask.size() - start);
+      std::vector<std::uint64_t> words(static_cast<std::size_t>((n + 7) / 8));
+      for (std::uint64_t& word : words) word = again.Bits();
+      for (Index k = 0; k < n; ++k) {
+        const int byte = int(words[std::size_t(k / 8)] >> (8 * (k % 8)) & 0xff);
+        bool dropped = byte < first;
+        if (byte == first) {
+          dropped = int(again.Bits() & 0xff) < second;
+          ++decided_late;
+        }
+        ASSERT_EQ(mask.data()[start + k], dropped ? Real(0) : Real(1 / (1 - p))) << start + k;
+      }
+    }
+    EXPECT_GT(decided_late, 0);
+    EXPECT_EQ(rng.Bits(), again.Bits()) << "bits drawn";
+  }
+}
+
 TEST(Dropout, EntriesOfAWordAreIndependent) {
   Rng rng(3, "test");
   Mat mask(4, 5000);

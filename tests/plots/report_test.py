@@ -8,8 +8,14 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from unittest import mock
 
+import numpy as np
+
 from plots import fig_cost, fig_embedding, fig_learning_curves, fig_options, report
+from plots.records import load_cells
+from plots.samples import Curve, Sample, author_samples, our_samples
+from plots.statistics import Moments
 from plots.style import inline_svg, svg_of
+from plots.text import moments
 from tree import with_reference, write_flat, write_run
 
 COUNTERS = {"physics_us": 80.5, "inference_us": 5, "learning_us": 20, "total_us": 105.5,
@@ -112,6 +118,43 @@ class ReportTest(unittest.TestCase):
         self.assertIn("of 2 comparisons 2 have p < 0.05; were there no difference at all, 0.100 would "
                       "be expected. With Holm's correction for their number 2 are left: PPO on "
                       "Cheetah's first task, PPO on Cheetah's second task.", self.files["REPORT.md"])
+
+    def test_agreement_holds_p_against_the_number_of_comparisons(self):
+        # Samples m -+ 1 of two runs each, deviation 1 (divisor n), error 1 of each mean: t of a
+        # difference d is d / sqrt(2) with 2 degrees of freedom, where p = 1 - t / sqrt(2 + t^2):
+        # d = 1000 has 2e-6, d = 8 has 0.0299, d = 2 has 0.293. Holm: 6e-6, 0.060, 0.293.
+        def sample(mean: float) -> Sample:
+            zero = Moments(0, 0, 2)
+            return Sample(1, 1, np.array([mean - 1, mean + 1]), np.array([]),
+                          Curve(np.array([1]), np.array([mean]), np.array([1]), 2), zero, zero, 0,
+                          np.empty((2, 0)))
+
+        keys = [("Hopper-v2", "ppo"), ("Ant-v2", "ppo"), ("Swimmer-v2", "ppo")]
+        ours = {key: sample(mean) for key, mean in zip(keys, (8, 1000, 2))}
+        paragraph, = report._agreement([task for task, _ in keys], ours,
+                                       {key: sample(0) for key in keys})
+        self.assertIn("of 3 comparisons 2 have p < 0.05", paragraph.text)
+        self.assertIn("With Holm's correction for their number 1 is left: PPO on Ant-v2.",
+                      paragraph.text)
+
+    def test_runs_of_unequal_length_are_not_compared(self):
+        # Hopper's Option2Vec ran to 1 000 000 steps, DAC+PPO to 500 000: its return there stands
+        # alone, beside the authors' curve at that step.
+        with tempfile.TemporaryDirectory() as folder:
+            results = with_reference(Path(folder))
+            write_flat(results, "Hopper-v2", "option2vec", [10, 20])
+            for seed in range(2):
+                write_run(results, "Hopper-v2", "dac_ppo", seed, [5 + seed] * 50)
+            samples = our_samples(load_cells(results), "paper")
+            authors = author_samples(results / "reference")
+            row = report._row("Hopper-v2", "dac_ppo", samples, authors)
+            there = authors["Hopper-v2", "dac_ppo"].curve
+            self.assertEqual(row[2], "5.500 ± 0.500 (2)")
+            self.assertEqual(row[4], moments(Moments(
+                float(np.interp(500_000, there.step, there.mean)),
+                float(np.interp(500_000, there.step, there.std)), there.n)))
+            self.assertEqual(row[6:9], ["-"] * 3)
+            self.assertEqual(row[-1], "at 500000 steps")
 
     def test_the_ablations_effect_is_in_the_deviations(self):
         # Without seeds 3 (diverged) and 4 (not run): differences 5, 5, 6 have the mean 5.333 with

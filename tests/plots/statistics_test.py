@@ -47,11 +47,23 @@ class ImprovementTest(unittest.TestCase):
         value = mean_improvement(np.array([1]), np.array([0]), np.array([0]), np.array([0, 1]))
         self.assertAlmostEqual(float(value), (1 + 0.25) / 2)
 
+    def test_of_tasks_pairs_the_two_samples_of_a_task(self):
+        # 3 never beats 5; 4 beats 1 and ties with 4: (0 + 3/4) / 2. First halves against second
+        # ones give (0 + 1) / 2, the rival's side 1 - 3/8.
+        samples = [np.array([3]), np.array([5]), np.array([4]), np.array([1, 4])]
+        self.assertEqual(float(mean_improvement(*samples)), 0.375)
+        # Along another axis the same: samples as columns.
+        self.assertEqual(float(mean_improvement(*[s[:, None] for s in samples], axis=0)[0]), 0.375)
+
 
 class HolmTest(unittest.TestCase):
     def test_worked_example(self):
         # Sorted 0.01, 0.02, 0.02, 0.6 times 4, 3, 2, 1: 0.04, 0.06, 0.04 (not below 0.06), 0.6.
         np.testing.assert_allclose(holm([0.6, 0.02, 0.01, 0.02]), [0.6, 0.06, 0.04, 0.06])
+
+    def test_one_is_left_where_two_are_below_the_level(self):
+        # Sorted 0.001, 0.03, 0.04 times 3, 2, 1: 0.003, 0.06, 0.04 (not below 0.06).
+        np.testing.assert_allclose(holm([0.03, 0.001, 0.04]), [0.06, 0.003, 0.06])
 
     def test_is_at_most_one(self):
         np.testing.assert_array_equal(holm([0.7, 0.9]), [1, 1])
@@ -108,6 +120,18 @@ class BootstrapTest(unittest.TestCase):
         # Constant strata have one resample each, whatever lies between them.
         samples = [np.full(5, 10.0), np.full(5, 0.0), np.full(4, 3.0), np.full(6, 7.0)]
         self.assertEqual(bootstrap(mean_improvement, *samples), (0.5, 0.5))
+
+    def test_samples_of_equal_size_are_not_paired(self):
+        # Resamples (1, 1) against (3, 3) and the other way round have probability 1/16 each, more
+        # than 2.5 %. Paired by position, both samples would always be the same: 1/2.
+        x = np.array([1.0, 3])
+        self.assertEqual(bootstrap(improvement, x, x), (0, 1))
+
+    def test_resamples_the_two_samples_of_each_task(self):
+        # As above for each task, and (0, 0) and (1, 1) for both with 1/16: the whole range. First
+        # halves against second ones would always lose.
+        samples = [np.array(x, dtype=float) for x in ([1, 3], [2, 2], [5, 7], [6, 6])]
+        self.assertEqual(bootstrap(mean_improvement, *samples), (0, 1))
 
     def test_of_a_mean_comes_near_the_normal_interval(self):
         x = np.random.default_rng(6).normal(size=400)
