@@ -9,19 +9,13 @@
 
 #include "base/check.h"
 #include "base/rng.h"
+#include "test_folder.h"
 
 namespace o2v {
 namespace {
 
-// A file of the test's own, removed at its end.
 class Csv : public testing::Test {
  protected:
-  Csv() : path_(testing::TempDir() + "csv_test_" + Name() + ".csv") {}
-  ~Csv() override { std::filesystem::remove(path_); }
-
-  static std::string Name() {
-    return testing::UnitTest::GetInstance()->current_test_info()->name();
-  }
   CsvTable Read(const std::string& text) {
     std::ofstream(path_, std::ios::binary) << text;
     return ReadCsv(path_);
@@ -37,7 +31,8 @@ class Csv : public testing::Test {
     return "";
   }
 
-  std::string path_;
+  TestFolder folder_;
+  std::string path_ = folder_ / "table.csv";
 };
 
 TEST_F(Csv, ReadsNamesAndNumbers) {
@@ -98,7 +93,7 @@ TEST_F(Csv, GapsAreReadWhereTheyAreAllowed) {
 
 TEST_F(Csv, MissingFilesAndFoldersAreRefused) {
   EXPECT_THROW(ReadCsv(path_ + ".missing"), ConfigError);
-  EXPECT_THROW(ReadCsv(testing::TempDir()), ConfigError);
+  EXPECT_THROW(ReadCsv(folder_.path()), ConfigError);
 }
 
 TEST_F(Csv, DamagedFilesAreReadOrRefusedButNeverCrash) {

@@ -1,51 +1,19 @@
 // The program from outside: exit codes, messages, files.
 
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
-#include <array>
-#include <cstdio>
+#include <algorithm>
 #include <filesystem>
 #include <string>
 
 #include "base/csv.h"
 #include "base/files.h"
+#include "program.h"
 
 namespace o2v {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct Outcome {
-  int code;
-  std::string out, err;
-};
-
-class Program : public testing::Test {
- protected:
-  void SetUp() override {
-    fs::remove_all(dir_);
-    fs::create_directories(dir_);
-  }
-  void TearDown() override { fs::remove_all(dir_); }
-
-  /// Runs `option2vec <arguments>` in the test's own folder.
-  Outcome Run(const std::string& arguments) const {
-    const std::string command = "cd '" + dir_.string() + "' && '" + O2V_PROGRAM + "' " + arguments +
-                                " > stdout 2> stderr < /dev/null";
-    const int status = std::system(command.c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, ReadFile(dir_ / "stdout"),
-            ReadFile(dir_ / "stderr")};
-  }
-  /// A run of two short rollouts.
-  Outcome Train(const std::string& more) const {
-    return Run("train --task InvertedPendulum-v2 --algo ppo --steps 128 --set rollout=64 " + more);
-  }
-
-  const fs::path dir_ =
-      fs::path(testing::TempDir()) /
-      (std::string("cli_") + testing::UnitTest::GetInstance()->current_test_info()->name());
-};
 
 bool OneLine(const std::string& text) {
   return !text.empty() && text.find('\n') == text.size() - 1;
@@ -227,7 +195,8 @@ TEST_F(Program, JobsRunThenDisappearThenSummarise) {
                       "[run]\nsteps = 1024\n[algo.ppo]\nrollout = 512\n");
   const std::string jobs = Run("jobs tiny.toml").out;
   ASSERT_EQ(std::count(jobs.begin(), jobs.end(), '\n'), 2);
-  EXPECT_EQ(std::system(("cd '" + dir_.string() + "' && sh -e stdout 2> /dev/null").c_str()), 0);
+  EXPECT_EQ(std::system(("cd '" + dir_.path().string() + "' && sh -e stdout 2> /dev/null").c_str()),
+            0);
   const Outcome again = Run("jobs tiny.toml");
   EXPECT_EQ(again.out, "");
   EXPECT_EQ(again.err, "");

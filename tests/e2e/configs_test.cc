@@ -6,6 +6,7 @@
 
 #include "harness/jobs.h"
 #include "harness/trainer.h"
+#include "test_folder.h"
 
 namespace o2v {
 namespace {
@@ -13,9 +14,10 @@ namespace {
 class PaperConfigs : public testing::TestWithParam<const char*> {};
 
 TEST_P(PaperConfigs, EveryRunOfTheFirstSeedMakesTwoUpdates) {
+  const TestFolder folder;
   JobQuery query;
   query.configs = {GetParam()};
-  query.results = testing::TempDir() + "/configs";
+  query.results = folder.path();
   query.seeds = {0};
   for (Job& job : ListJobs(query)) {
     // Steps a worker: two rollouts take no time. IOPG has episodes instead.

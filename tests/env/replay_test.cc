@@ -7,6 +7,7 @@
 
 #include "base/check.h"
 #include "env/task_helpers.h"
+#include "test_folder.h"
 
 namespace o2v {
 namespace {
@@ -25,13 +26,13 @@ std::string ConfigErrorOf(const std::string& task, const CsvTable& table) {
 }
 
 TEST(Replay, FollowsAWholeFileAndWritesItsColumns) {
-  const std::filesystem::path out = testing::TempDir() + "replay_out.csv";
+  const TestFolder folder;
+  const std::filesystem::path out = folder / "out.csv";
   EXPECT_LT(ReplayFile("Hopper-v2", Trajectory(), out).value, 1e-9);
   const CsvTable written = ReadCsv(out), reference = ReadCsv(Trajectory());
   EXPECT_EQ(written.columns, reference.columns);
   EXPECT_EQ(written.Rows(), reference.Rows());
   EXPECT_LT(LargestDeviation(written, reference).value, 1e-9);
-  std::filesystem::remove(out);
 }
 
 TEST(Replay, FindsAWrongNumberAndSaysWhere) {

@@ -8,6 +8,7 @@
 #include "base/check.h"
 #include "base/files.h"
 #include "harness/record.h"
+#include "test_folder.h"
 
 namespace o2v {
 namespace {
@@ -16,9 +17,6 @@ namespace fs = std::filesystem;
 
 class Jobs : public testing::Test {
  protected:
-  void SetUp() override { fs::remove_all(results_); }
-  void TearDown() override { fs::remove_all(results_); }
-
   JobQuery Query() const {
     JobQuery query;
     query.program = "./option2vec";
@@ -41,9 +39,8 @@ class Jobs : public testing::Test {
                         RecordJson(ManifestJson(manifest), ToToml(job.config)));
   }
 
-  const fs::path results_ =
-      fs::path(testing::TempDir()) /
-      (std::string("jobs_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+  const TestFolder folder_;
+  const fs::path results_ = folder_ / "results";
 };
 
 TEST_F(Jobs, AreTheProductOfTheListsWithSeedsOutermost) {

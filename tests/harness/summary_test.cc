@@ -10,6 +10,7 @@
 #include "base/files.h"
 #include "harness/config.h"
 #include "harness/record.h"
+#include "test_folder.h"
 
 namespace o2v {
 namespace {
@@ -18,9 +19,6 @@ namespace fs = std::filesystem;
 
 class Summary : public testing::Test {
  protected:
-  void SetUp() override { fs::remove_all(root_); }
-  void TearDown() override { fs::remove_all(root_); }
-
   /// A record as a finished run leaves it; `curve` are rows "step,return".
   void Record(const std::string& task, int seed, std::int64_t wanted_steps,
               const std::string& curve, RunStatus status = RunStatus::kDone,
@@ -42,9 +40,8 @@ class Summary : public testing::Test {
                         RecordJson(ManifestJson(manifest), ToToml(ResolveRun(request))));
   }
 
-  const fs::path root_ =
-      fs::path(testing::TempDir()) /
-      (std::string("summary_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+  const TestFolder folder_;
+  const fs::path root_ = folder_ / "results";
 };
 
 TEST_F(Summary, HasARowForTheEndOfEachTaskOfAPair) {
