@@ -225,5 +225,62 @@ TEST(ContactForces, CostWhatTheRewardSays) {
   EXPECT_NEAR(difference, expected, 1e-12);
 }
 
+/// Sum of squares of the contact forces, the last 14 x 6 observations of a humanoid.
+double SquaredForces(const TaskUnderTest& task) {
+  return SquaredNorm(std::span(task.obs).last(84));
+}
+
+class HumanoidCosts : public testing::TestWithParam<std::string> {};
+
+TEST_P(HumanoidCosts, OfContactAreTheSquaredForces) {
+  // The same motion with and without forces: the rewards differ by the cost of contact alone.
+  TaskUnderTest off(GetParam()), on(GetParam(), true);
+  off.Reset();
+  on.Reset();
+  double largest = 0;
+  for (int step = 0; step < 60; ++step) {
+    const std::vector<double> a = on.Action();
+    const double difference = off.Step(a).reward - on.Step(a).reward;
+    const double cost = 0.5e-6 * SquaredForces(on);
+    ASSERT_LT(cost, 10);
+    EXPECT_NEAR(difference, cost, 1e-9) << step;
+    largest = std::max(largest, cost);
+  }
+  EXPECT_GT(largest, 1e-3);
+}
+
+TEST_P(HumanoidCosts, OfContactAreAtMostTen) {
+  TaskUnderTest off(GetParam()), on(GetParam(), true);
+  std::vector<double> qpos = on.Qpos0(), qvel = on.AtRest();
+  qvel[2] = -30;  // thrown at the floor [m/s]
+  off.ResetTo(qpos, qvel);
+  on.ResetTo(qpos, qvel);
+  double most = 0;
+  for (int step = 0; step < 20; ++step) {
+    const double difference = off.Step(off.NoAction()).reward - on.Step(on.NoAction()).reward;
+    const double cost = 0.5e-6 * SquaredForces(on);
+    EXPECT_NEAR(difference, std::min(cost, 10.0), 1e-9) << step;
+    most = std::max(most, cost);
+  }
+  EXPECT_GT(most, 20);
+}
+
+TEST_P(HumanoidCosts, OfControlAreATenthOfTheSquares) {
+  // The same motion twice, since the motors have no force: 17 controls of +-0.4 cost
+  // 0.1 x 17 x 0.16 = 0.272.
+  TaskUnderTest task(GetParam());
+  mjModel& m = task.env->model();
+  std::fill_n(m.actuator_gear, 6 * m.nu, 0.0);  // motors without force
+  std::vector<double> a = task.NoAction();
+  task.ResetTo(task.Qpos0(), task.AtRest());
+  const double idle = task.Step(a).reward;
+  for (std::size_t i = 0; i < a.size(); ++i) a[i] = i % 2 ? 0.4 : -0.4;
+  task.ResetTo(task.Qpos0(), task.AtRest());
+  EXPECT_NEAR(idle - task.Step(a).reward, 0.272, 1e-10);
+}
+
+INSTANTIATE_TEST_SUITE_P(Tasks, HumanoidCosts, testing::Values("Humanoid-v2", "HumanoidStandup-v2"),
+                         [](const auto& info) { return TestName(info.param); });
+
 }  // namespace
 }  // namespace o2v
