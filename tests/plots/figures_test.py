@@ -3,6 +3,7 @@
 import tempfile
 import unittest
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 
@@ -211,6 +212,17 @@ class RotationsTest(unittest.TestCase):
         self.assertEqual(ROTATIONS, 1000)
         self.assertTrue(finding.measured.endswith(f"p = {1 / 1001:.2g}"), finding.measured)
         self.assertTrue(finding.measured.startswith("100 % of the effect"), finding.measured)
+
+    def test_p_counts_rotations_that_are_as_large(self):
+        # Two dimensions with an action each have the share 1, turned by 45 degrees 1/2. Of 1000
+        # rotations 250 turn by nothing: (1 + 250) / 1001.
+        turned = np.array([[1, -1], [1, 1]]) / 2**0.5
+        rotations = np.array([np.eye(2)] * 250 + [turned] * 750)
+        claim, = (c for c in CLAIMS if c.text == "Embeddings are interpretable")
+        with mock.patch("plots.claims.stats.ortho_group.rvs", return_value=rotations):
+            finding, = claim.judge(Evidence("paper", {}, effects={Path("a"): 2 * np.eye(2)}))
+        self.assertEqual(finding.measured, "100 % of the effect on primary actions, after rotation "
+                         "62 %, p = 0.25")
 
 
 class CostTest(InFolder):
