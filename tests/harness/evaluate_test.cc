@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "fake_run.h"
 #include "harness/checkpoint.h"
 
@@ -75,6 +78,37 @@ TEST_F(Evaluation, ActsWithTheDrawnOptionClippedToTheControlRange) {
         e.length == 2 ? (-3 + std::sqrt(-1 - 2 * e.ret)) / 2 : -2 + std::sqrt((-e.ret - 2) / 3);
     EXPECT_EQ(e.length, x0 > 0 ? 2 : 3) << x0;
     EXPECT_LE(std::abs(x0), 1);
+  }
+}
+
+TEST_F(Evaluation, AddsNoiseToSampledActionsOnly) {
+  // mu = 0, sigma = 0.5: mean actions leave the point where it is for 7 steps, and each costs
+  // x0^2. Sampled ones are those of the stream "eval.action".
+  struct FirstOption final : FakeAlgorithm {
+    using FakeAlgorithm::FakeAlgorithm;
+    void OptionPolicy(const Mat&, const std::vector<int>&, const std::vector<char>&,
+                      Mat& P) override {
+      P = Mat::Zero(2, 1);
+      P(0) = 1;
+    }
+  } algorithm(env_.Spec(), 1);
+  for (Param* p : algorithm.Params()) p->value.setZero();
+  Rng resets(5, "eval.reset"), actions(5, "eval.action");
+  const auto mean = Evaluate(algorithm, normalizer_, env_, 4, /*sample_action=*/false, 5);
+  const auto sampled = Evaluate(algorithm, normalizer_, env_, 4, /*sample_action=*/true, 5);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double x0 = resets.Uniform(-1, 1);
+    EXPECT_EQ(mean[i].length, 7);
+    EXPECT_NEAR(mean[i].ret, -7 * x0 * x0, 1e-12);
+    double x = x0, ret = 0;
+    int length = 0;
+    while (length < 7 && std::abs(x) <= 2) {
+      x += std::clamp(0.5 * actions.Normal(), -1.0, 1.0);
+      ret -= x * x;
+      ++length;
+    }
+    EXPECT_EQ(sampled[i].length, length);
+    EXPECT_NEAR(sampled[i].ret, ret, 1e-12);
   }
 }
 

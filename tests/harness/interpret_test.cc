@@ -9,6 +9,7 @@
 
 #include "algo/setup.h"
 #include "fake_run.h"
+#include "harness/evaluate.h"
 #include "small_hyper.h"
 
 namespace o2v {
@@ -102,6 +103,17 @@ TEST_F(Interpreter, LeavesTheNetworkAsItWas) {
   EXPECT_TRUE(Value("embed.W_o") == W_o);
   EXPECT_TRUE(x.W_o == W_o.cast<double>());
   EXPECT_EQ(InterpretationCsv(x), InterpretationCsv(Run(1e8)));
+}
+
+TEST_F(Interpreter, VisitsWhatSampledActionsDo) {
+  // sigma = 5: pushed to and fro by 1 a step, the point is often beyond 2 before the limit.
+  Value("action.sigma.b").setConstant(5);
+  Index expected = 0;
+  for (const EvalEpisode& e : Evaluate(*algorithm_, normalizer_, env_, 3, true, /*seed=*/1)) {
+    expected += e.length;
+  }
+  EXPECT_LT(expected, 21) << "of mean actions";
+  EXPECT_EQ(Run(0.5).states, expected);
 }
 
 TEST_F(Interpreter, RefusesWhatItCannotDo) {
