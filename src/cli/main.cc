@@ -342,7 +342,7 @@ void AddParams(CLI::App& app) {
 void AddReplay(CLI::App& app, int& exit_code) {
   struct Options {
     std::string task, trajectory, out;
-    double tolerance = 1e-9;  // spec/environments.md, traces
+    double tolerance = 1e-9;  // spec E.6
   };
   auto opt = std::make_shared<Options>();
   CLI::App* replay = app.add_subcommand("replay", "a recorded trajectory against our simulation");

@@ -7,7 +7,7 @@ namespace {
 /// obs (5): cart x [m], cos and sin of the pole's angle, qvel [m/s, rad/s]. action (1): control in
 /// [-1, 1]. limit: 1000 steps of 0.01 s.
 /// initial state: cart U(-0.1, 0.1), pole U(-0.034, 0.034), qvel 0.01 N.
-/// Source: spec/environments.md, DeepMind Control tasks.
+/// Source: spec E.3.
 class Cartpole : public DmEnv {
  protected:
   Cartpole(const char* id, int time_limit)

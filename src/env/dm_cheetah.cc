@@ -9,7 +9,7 @@ namespace {
 /// limit: 1000 steps of 0.01 s.
 /// initial state: what 200 physics steps without control make of limited joints drawn uniformly in
 /// their ranges.
-/// Source: spec/environments.md, DeepMind Control tasks.
+/// Source: spec E.3.
 class Cheetah final : public DmEnv {
  public:
   Cheetah(const char* id, double direction, int time_limit)

@@ -11,7 +11,7 @@ namespace o2v {
 
 /// A task of DeepMind Control: it never terminates, its reward lies in [0, 1] and, like the
 /// observation, is one of the state after the step alone, whose derived quantities are up to date.
-/// Source: spec/environments.md, DeepMind Control tasks.
+/// Source: spec E.3.
 class DmEnv : public MujocoEnv {
  public:
   void Visit(StateVisitor& v, const std::string& prefix) final;

@@ -8,7 +8,7 @@ namespace {
 /// (5): control in [-1, 1]. reward: Gaussian in the distance of up from 1, or from -1; 0.1 at 1.
 /// limit: 1000 steps of 0.04 s.
 /// initial state: orientation uniform, joints U(-0.2, 0.2).
-/// Source: spec/environments.md, DeepMind Control tasks.
+/// Source: spec E.3.
 class Fish final : public DmEnv {
  public:
   Fish(const char* id, double direction, int time_limit)

@@ -12,7 +12,7 @@ namespace {
 /// 0. limit: 1000 steps of 0.02 s.
 /// initial state: shoulder U(-pi, pi), wrist uniform in its range; then the target at an angle
 /// U(0, 2 pi), from the y axis, and a radius U(0.05, 0.2) [m].
-/// Source: spec/environments.md, DeepMind Control tasks.
+/// Source: spec E.3.
 class Reacher final : public DmEnv {
  public:
   Reacher(const char* id, double target_radius, int time_limit)

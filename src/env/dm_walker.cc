@@ -11,7 +11,7 @@ namespace {
 /// uprightness; when walking times a factor that rises from 1/6 at rest to 1 at 1 m/s in the task's
 /// direction. limit: 1000 steps of 0.025 s.
 /// initial state: limited joints uniform in their ranges, the torso turned by U(-pi, pi).
-/// Source: spec/environments.md, DeepMind Control tasks.
+/// Source: spec E.3.
 class Walker final : public DmEnv {
  public:
   Walker(const char* id, double height, double direction, int time_limit)

@@ -29,7 +29,7 @@ struct StepResult {
 
 /// Switches of the physics layer.
 struct EnvOptions {
-  bool contact_forces = false;  // fill cfrc_ext (mj_rnePostConstraint); spec "Common rules"
+  bool contact_forces = false;  // fill cfrc_ext (mj_rnePostConstraint); spec E.1
 };
 
 /// One environment. Never resets by itself.

@@ -9,7 +9,7 @@ namespace {
 /// obs (111): qpos[2:] [m, 1, rad], qvel [m/s, rad/s], cfrc_ext of 14 bodies clipped to +-1 [N m,
 /// N]. action (8): control in [-1, 1]. reward: speed of the torso [m/s] - 0.5 |a|^2 - 0.5e-3
 /// |clip(cfrc_ext)|^2 + 1. ends: torso height outside [0.2, 1]. limit: 1000 steps of 0.05 s. reset
-/// noise: qpos U(-0.1, 0.1), qvel 0.1 N. Source: spec/environments.md, Gym -v2 tasks.
+/// noise: qpos U(-0.1, 0.1), qvel 0.1 N. Source: spec E.2.
 class Ant final : public MujocoEnv {
  public:
   Ant(const EnvOptions& options, int time_limit)

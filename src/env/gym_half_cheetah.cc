@@ -7,7 +7,7 @@ namespace {
 /// obs (17): qpos[1:] [m, rad], qvel [m/s, rad/s]. action (6): control in [-1, 1].
 /// reward: speed [m/s] - 0.1 |a|^2. never ends. limit: 1000 steps of 0.05 s.
 /// reset noise: qpos U(-0.1, 0.1), qvel 0.1 N.
-/// Source: spec/environments.md, Gym -v2 tasks.
+/// Source: spec E.2.
 class HalfCheetah final : public MujocoEnv {
  public:
   HalfCheetah(const EnvOptions& options, int time_limit)

@@ -10,7 +10,7 @@ namespace {
 /// obs (11): qpos[1:] [m, rad], qvel clipped to +-10 [m/s, rad/s]. action (3): control in [-1, 1].
 /// reward: speed [m/s] + 1 - 1e-3 |a|^2. ends: unhealthy state. limit: 1000 steps of 0.008 s.
 /// reset noise: qpos and qvel U(-0.005, 0.005).
-/// Source: spec/environments.md, Gym -v2 tasks.
+/// Source: spec E.2.
 class Hopper final : public MujocoEnv {
  public:
   Hopper(const EnvOptions& options, int time_limit)

@@ -5,7 +5,7 @@ namespace {
 
 /// Humanoid-v2: walk forward on two legs. Observation, action, noise: HumanoidBody.
 /// reward: 1.25 speed of the centre of mass [m/s] + 5 - cost. ends: torso height outside [1, 2].
-/// Source: spec/environments.md, Gym -v2 tasks.
+/// Source: spec E.2.
 class Humanoid final : public HumanoidBody {
  public:
   Humanoid(const EnvOptions& options, int time_limit)

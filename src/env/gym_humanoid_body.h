@@ -10,7 +10,7 @@ namespace o2v {
 /// obs (376): qpos[2:] (22) [m, 1, rad], qvel (23) [m/s, rad/s], cinert (14 x 10), cvel (14 x 6),
 /// qfrc_actuator (23), cfrc_ext (14 x 6), MuJoCo's units. action (17): control in [-0.4, 0.4].
 /// reset noise: qpos and qvel U(-0.01, 0.01). limit: 1000 steps of 0.015 s.
-/// Source: spec/environments.md, Gym -v2 tasks.
+/// Source: spec E.2.
 class HumanoidBody : public MujocoEnv {
  protected:
   HumanoidBody(const std::string& id, const std::string& model, const EnvOptions& options,

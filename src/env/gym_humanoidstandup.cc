@@ -6,7 +6,7 @@ namespace {
 /// HumanoidStandup-v2: get up from lying on the back. Observation, action, noise: HumanoidBody.
 /// reward: torso height [m] / physics timestep [s] + 1 - cost. never ends.
 /// The divisor is not dt: a known oddity of the reference.
-/// Source: spec/environments.md, Gym -v2 tasks.
+/// Source: spec E.2.
 class HumanoidStandup final : public HumanoidBody {
  public:
   HumanoidStandup(const EnvOptions& options, int time_limit)

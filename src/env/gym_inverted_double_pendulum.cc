@@ -11,7 +11,7 @@ namespace {
 /// reward: 10 - (0.01 x^2 + (z - 2)^2) - (1e-3 w1^2 + 5e-3 w2^2); x, z of the tip [m], w the poles'
 /// angular velocities [rad/s]. ends: z <= 1. limit: 1000 steps of 0.05 s.
 /// reset noise: qpos U(-0.1, 0.1), qvel 0.1 N.
-/// Source: spec/environments.md, Gym -v2 tasks.
+/// Source: spec E.2.
 class InvertedDoublePendulum final : public MujocoEnv {
  public:
   InvertedDoublePendulum(const EnvOptions& options, int time_limit)

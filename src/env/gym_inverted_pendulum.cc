@@ -9,7 +9,7 @@ namespace {
 /// obs (4): qpos [m, rad], qvel [m/s, rad/s]. action (1): control in [-3, 3].
 /// reward: 1. ends: pole tilted by more than 0.2 rad. limit: 1000 steps of 0.04 s.
 /// reset noise: qpos and qvel U(-0.01, 0.01).
-/// Source: spec/environments.md, Gym -v2 tasks.
+/// Source: spec E.2.
 class InvertedPendulum final : public MujocoEnv {
  public:
   InvertedPendulum(const EnvOptions& options, int time_limit)

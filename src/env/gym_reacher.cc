@@ -12,7 +12,7 @@ namespace {
 /// reward: -|fingertip - target| before the step - |a|^2. never ends. limit: 50 steps of 0.02 s.
 /// reset noise: qpos U(-0.1, 0.1), then the target uniform in the disc of radius 0.2 [m];
 /// qvel U(-0.005, 0.005), 0 for the target.
-/// Source: spec/environments.md, Gym -v2 tasks.
+/// Source: spec E.2.
 class Reacher final : public MujocoEnv {
  public:
   Reacher(const EnvOptions& options, int time_limit)

@@ -7,7 +7,7 @@ namespace {
 /// obs (8): qpos[2:] [rad], qvel [m/s, rad/s]. action (2): control in [-1, 1].
 /// reward: speed [m/s] - 1e-4 |a|^2. never ends. limit: 1000 steps of 0.04 s.
 /// reset noise: qpos and qvel U(-0.1, 0.1).
-/// Source: spec/environments.md, Gym -v2 tasks.
+/// Source: spec E.2.
 class Swimmer final : public MujocoEnv {
  public:
   Swimmer(const EnvOptions& options, int time_limit)

@@ -6,8 +6,7 @@ namespace {
 /// Walker2d-v2: walk forward on two legs in a plane.
 /// obs (17): qpos[1:] [m, rad], qvel clipped to +-10 [m/s, rad/s]. action (6): control in [-1, 1].
 /// reward: speed [m/s] + 1 - 1e-3 |a|^2. ends: torso low, high or tilted. limit: 1000 steps of
-/// 0.008 s. reset noise: qpos and qvel U(-0.005, 0.005). Source: spec/environments.md, Gym -v2
-/// tasks.
+/// 0.008 s. reset noise: qpos and qvel U(-0.005, 0.005). Source: spec E.2.
 class Walker2d final : public MujocoEnv {
  public:
   Walker2d(const EnvOptions& options, int time_limit)

@@ -39,8 +39,7 @@ void AddUniform(Rng& rng, double bound, std::span<double> x);
 void AddNormal(Rng& rng, double scale, std::span<double> x);
 
 /// One simulated task. A derived class states the task's rules; stepping, time limit, divergence
-/// and resumption are here. Neither Reset nor Step allocates. Source: spec/environments.md, Common
-/// rules.
+/// and resumption are here. Neither Reset nor Step allocates. Source: spec E.1.
 class MujocoEnv : public Env {
  public:
   const EnvSpec& Spec() const final { return spec_; }

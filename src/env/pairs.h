@@ -12,7 +12,7 @@ struct TaskPair {
   std::string first, second;
 };
 
-/// The transfer pairs. Source: spec/environments.md, Transfer pairs.
+/// The transfer pairs. Source: spec E.4.
 const std::vector<TaskPair>& PairRegistry();
 
 /// "Cheetah" or "dm-cheetah-run,dm-cheetah-backward" -> the ids in order; an id -> itself. The ids

@@ -28,7 +28,7 @@ struct Deviation {
 /// stepping with the controls of the row before.
 /// Returns ours in the same rows and columns. Throws ConfigError, naming file, line and column,
 /// when the columns are not the task's or the steps do not count up; DivergedError as Env::Step.
-/// Source: spec/environments.md, Trajectories and step oracles.
+/// Source: spec E.6.
 CsvTable Replay(Env& env, const CsvTable& trajectory);
 
 /// Largest deviation of `ours` from a reference of the same shape, over the first `rows` rows of

@@ -21,7 +21,7 @@ enum class Sigmoid { kGaussian, kLinear, kQuadratic };
 /// margins, falls from 1 through `value_at_margin` at d = 1: Gaussian exp(-(d s)^2 / 2),
 /// s^2 = -2 ln(value_at_margin); linear 1 - (1 - value_at_margin) d and quadratic
 /// 1 - (1 - value_at_margin) d^2, both at least 0. Without a margin it is 0 there.
-/// Source: spec/environments.md, DeepMind Control tasks.
+/// Source: spec E.3.
 inline double Tolerance(double x, Bounds bounds, double margin = 0,
                         Sigmoid sigmoid = Sigmoid::kGaussian, double value_at_margin = 0.1) {
   if (bounds.low <= x && x <= bounds.high) return 1;

@@ -352,7 +352,7 @@ TEST_P(EveryDmTask, AStepIsNPhysicsStepsAndLeavesDerivedQuantitiesUpToDate) {
   const mjModel& m = by_hand.env->model();
   mjData& d = by_hand.env->data();
   const bool ten = GetParam().starts_with("dm-fish") || GetParam().starts_with("dm-walker");
-  const int n = ten ? 10 : 1;  // spec/environments.md
+  const int n = ten ? 10 : 1;  // spec E.3
   task.Reset();
   by_hand.Reset();
   for (int step = 0; step < 10; ++step) {

@@ -6,7 +6,7 @@
 namespace o2v {
 namespace {
 
-// Source: spec/environments.md; actions and bounds from the model dumps.
+// Source: spec E.1 to E.4; actions and bounds from the model dumps.
 struct Fact {
   const char* id;
   int S, A, limit;

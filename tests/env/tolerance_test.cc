@@ -1,4 +1,4 @@
-// Worked values; source of the formulas: spec/environments.md, DeepMind Control tasks.
+// Worked values; source of the formulas: spec E.3.
 
 #include "env/tolerance.h"
 

@@ -198,7 +198,7 @@ struct FieldDeviation {
 
 /// Largest deviation of a dump `a` of ours from a reference b: numbers as above, integers and
 /// strings exactly; b's empty names and the ranges of its unlimited joints are free. Source:
-/// spec/environments.md (the bound is on |a - b|).
+/// spec E.5 (the bound is on |a - b|).
 inline FieldDeviation CompareDumps(const ModelDump::Json& a, const ModelDump::Json& b,
                                    const std::string& field = "") {
   constexpr double kUnequal = std::numeric_limits<double>::infinity();

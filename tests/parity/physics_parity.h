@@ -29,7 +29,7 @@ struct ParityRow {
   bool Pass() const { return deviation <= bound; }
 };
 
-/// Rows of a segment that have a bound. Source: spec/environments.md.
+/// Rows of a segment that have a bound. Source: spec E.6.
 constexpr std::size_t kBoundRows = 10;
 
 inline std::unique_ptr<MujocoEnv> MakeMujocoEnv(const std::string& task) {

@@ -1,4 +1,4 @@
-// Every task's model, trajectory and step oracle within the bounds of spec/environments.md.
+// Every task's model, trajectory and step oracle within the bounds of spec E.5 and E.6.
 
 #include <gtest/gtest.h>
 
