@@ -1,7 +1,7 @@
 """Parameters against the number of options K: Option2Vec and the option methods.
 
 Counts are those of HalfCheetah-v2 (S = 17, A = 6) with hidden layers of h. Every function below
-counts all parameters that a network allocates; sections are those of the algorithm specification.
+counts all parameters that a network allocates; sections are those of docs/algorithms.md.
 """
 
 from collections.abc import Sequence

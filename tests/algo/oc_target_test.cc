@@ -1,4 +1,4 @@
-// When OC's target network takes over the weights (spec 4.3 f).
+// When OC's target network takes over the weights (spec 4.3 (f)).
 
 #include <gtest/gtest.h>
 

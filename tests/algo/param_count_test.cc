@@ -67,8 +67,7 @@ TEST(ParamCount, OfReleasedDacOneStepIsTheSpecifications) {  // spec 2.4
 TEST(ParamCount, OfRecommendedDacOneStepIsTheSpecifications) {  // spec 2.5
   EXPECT_EQ(Count("dac_onestep", kPaper, {}), (Size{34232, 34232}));
   EXPECT_EQ(Count("dac_onestep", kPaper, {"hidden=128"}), (Size{117560, 117560}));
-  // The specification's 34 040 for the integer index is without the LayerNorm that comes with it, 2
-  // (S + 1) more.
+  // The index as a number, one more input, and 2 (S + 1) of the LayerNorm that comes with it.
   const Index with_norm = 34040 + 2 * (17 + 1);
   EXPECT_EQ(Count("dac_onestep", kPaper, {"onestep_index=released"}), (Size{with_norm, with_norm}));
 }

@@ -1,4 +1,4 @@
-// What PPOC credits its master policy with (spec 4.2 d, g).
+// What PPOC credits its master policy with (spec 4.2 (d), (g)).
 
 #include <gtest/gtest.h>
 
