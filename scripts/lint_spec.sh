@@ -1,6 +1,6 @@
 #!/bin/sh
-# Checks that every "spec N.N" of code, configurations and pages is a section of docs/algorithms.md, every
-# "spec E.N" one of docs/environments.md, and that a letter or an item named with it, as in
+# Checks that every "spec N.N" of code, configurations and pages is a section of docs/algorithms.md,
+# every "spec E.N" one of docs/environments.md, and that a letter or an item named with it, as in
 # "spec 4.6 (g)" or "spec 2.6 item 5", stands there. Lists as in "spec 2.2 to 2.6" or "spec 2.6, 7"
 # are checked whole, across lines too.
 set -eu
@@ -28,7 +28,8 @@ find README.md docs src tests bench paper_configs plots -type f ! -path 'tests/d
     print FILENAME ":" FNR ": docs/ has no " what; bad = 1
   }
 
-  # `want` is what the next word may be: "" nothing, "number" the first section, "more" what goes on.
+  # What the next word may be is `want`: "" nothing, "number" the first section, "more" a list that
+  # goes on.
   function read_word(word,    bare, tail) {
     bare = word
     gsub(/^[("]+|[)"]+$/, "", bare)
