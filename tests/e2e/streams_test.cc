@@ -54,6 +54,9 @@ class Streams : public testing::Test {
 TEST_F(Streams, ThatAreClosedChangeNothing) {
   ASSERT_EQ(Shell("$TRAIN --out open").code, 0);
   const char* closed[] = {"<&-", ">&-", "2>&-", "<&- >&-", ">&- 2>&-", "<&- 2>&-", "<&- >&- 2>&-"};
+  const Outcome list = Shell("\"$O\" list tasks >&-");
+  EXPECT_EQ(list.code, 0);
+  EXPECT_EQ(list.err, "");
   for (std::size_t i = 0; i < std::size(closed); ++i) {
     const std::string run = std::to_string(i);
     EXPECT_EQ(Shell("$TRAIN --out " + run + " " + closed[i]).code, 0) << closed[i];

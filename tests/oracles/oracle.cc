@@ -47,7 +47,7 @@ std::unique_ptr<Algorithm> Make(const json& file, const OracleMethod& method, do
   set("clip_norm", clip_norm);
   set("hidden", sizes.at("h"));
   set("minibatch", 1);  // the batch is given
-  set("rollout", 1);
+  set("rollout", 2);    // likewise; advantages need two samples
   set("epochs", 1);
   switches = SwitchesFor(ParseFidelity(file.at("fidelity")));
   if (file.at("switches").contains("adv_std_eps")) {
