@@ -1,7 +1,7 @@
 """Reads records of finished runs and the tables of results/.
 
 Strict: an unknown column, a number that is none, a file that contradicts its place or its
-neighbours is a DamagedFile error that names file and line.
+neighbours is a DamagedFile error that names file and line. A record with one is left out, by name.
 
 A record is results/<experiment>/<fidelity>[-<switch>=<value>]/<task>/<algorithm>/seed-NNN.json
 (status, versions, resolved configuration) and .csv beside it (smoothed return and, of methods with
@@ -12,6 +12,7 @@ import csv
 import json
 import math
 import re
+import sys
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -19,6 +20,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+
+from plots.standard import differences, settings_of, standard, toml
 
 INFINITE = ("HalfCheetah-v2", "Swimmer-v2", "HumanoidStandup-v2", "Reacher-v2")  # never terminate
 FINITE = ("Walker2d-v2", "Hopper-v2", "InvertedPendulum-v2", "InvertedDoublePendulum-v2", "Ant-v2",
@@ -47,6 +50,7 @@ SEEDS = range(10)  # of a whole grid
 MILLION = 1_000_000  # [environment steps] of training on a task
 LEFT_OUT = ("quick", "ci")  # experiments that are no evidence
 INTERPRETATIONS = "interpret"  # beside the experiments; plots/tables.py reads them
+FORMAT = 1  # of records; those that do not say it are of 1
 NO_SETTINGS = ("run.seed", "run.checkpoint_every", "run.eval_every", "run.eval_episodes")
 
 
@@ -140,22 +144,34 @@ def number_or_nan(text: str) -> float:
     return finite(text) if text else math.nan
 
 
-def load_cells(results: Path, experiments: Iterable[str] | None = None) -> dict[Key, Cell]:
+def load_cells(results: Path, experiments: Iterable[str] | None = None,
+               refused: list[str] | None = None) -> dict[Key, Cell]:
     """Cells of `experiments`; by default of all folders of records but quick and ci. Experiments
-    are pooled: the same run twice, or settings that differ within a cell, are errors."""
+    are pooled. Records that do not count are left out and named: in `refused`, without it on
+    standard error. Such are damaged ones, those in a place that contradicts them, a run that is
+    there twice, and settings that are not the most frequent ones of the cell."""
+    bad: list[str] = [] if refused is None else refused
     if experiments is None:
         folders = [d.name for d in results.iterdir() if d.is_dir()] if results.is_dir() else []
         experiments = sorted(set(folders) - {*LEFT_OUT, INTERPRETATIONS})
     groups: dict[Key, dict[int, Run]] = {}
     for experiment in experiments:
-        for path in sorted((results / experiment).glob("*/*/*/seed-*.json")):
-            run = read_run(path)
-            group = groups.setdefault(run.key, {})
-            if run.seed in group:
-                raise DamagedFile(f"{path}:1: the same run as {group[run.seed].path}")
-            group[run.seed] = run
-    return {key: _cell([group[seed] for seed in sorted(group)])
-            for key, group in sorted(groups.items())}
+        for path in sorted((results / experiment).glob("*/*/*/*.json")):
+            if any(part.startswith(".") for part in path.parts[-4:]):
+                continue
+            try:
+                run = read_run(path)
+                group = groups.setdefault(run.key, {})
+                if run.seed in group:
+                    raise DamagedFile(f"{path}:1: the same run as {group[run.seed].path}")
+                group[run.seed] = run
+            except DamagedFile as error:
+                bad.append(str(error))
+    cells = {key: _cell([group[seed] for seed in sorted(group)], bad)
+             for key, group in sorted(groups.items()) if group}
+    if refused is None and bad:
+        print(*bad, f"{len(bad)} records refused", sep="\n", file=sys.stderr)
+    return cells
 
 
 def read_run(path: Path) -> Run:
@@ -164,11 +180,14 @@ def read_run(path: Path) -> Run:
         meta = json.loads(path.read_text(encoding="utf-8"))
     except json.JSONDecodeError as error:
         raise DamagedFile(f"{path}:{error.lineno}: {error.msg}") from None
+    except (OSError, ValueError) as error:
+        raise DamagedFile(f"{path}:1: {error}") from None
     kinds: dict[str, type | tuple[type, ...]] = {
         "status": str, "steps": int, "commit": str, "compiler": str, "flags": str,
         "versions": dict, "config": str}
     later: dict[str, type | tuple[type, ...]] = {
-        "wall_seconds": (int, float), "cpu_seconds": (int, float), "revision": int}
+        "wall_seconds": (int, float), "cpu_seconds": (int, float), "revision": int,
+        "format": int}
     _check(isinstance(meta, dict), path, "no JSON object")
     for name in sorted(set(kinds) - set(meta)):
         raise DamagedFile(f"{path}:1: no '{name}'")
@@ -176,6 +195,8 @@ def read_run(path: Path) -> Run:
         _check(name in kinds | later, path, f"unknown '{name}'")
         _check(isinstance(value, (kinds | later)[name]) and not isinstance(value, bool), path,
                f"'{name}': {value}")
+    _check(meta.get("format", 1) == FORMAT, path,
+           f"format {meta.get('format')}; these scripts read {FORMAT}")
     _check(meta["status"] in ("done", "diverged"), path, f"status '{meta['status']}'")
     try:
         config = tomllib.loads(meta["config"])
@@ -187,14 +208,20 @@ def read_run(path: Path) -> Run:
 
     fidelity, _, variant = path.parts[-4].partition("-")
     task, algorithm = path.parts[-3:-1]
-    seed = int(path.stem.removeprefix("seed-")) if re.fullmatch(r"seed-\d+", path.stem) else -1
-    place = (fidelity, PAIRS.get(task, task), algorithm, seed)
+    seed = made[3]
+    place = (fidelity, PAIRS.get(task, task), algorithm, path.name)
+    made = (*made[:3], f"seed-{seed:03d}.json")
     _check(made == place, path, f"config is of {made}, the place of {place}")
     _check(task in TASKS or task in PAIRS, path, f"unknown task '{task}'")
     _check(algorithm in METHODS, path, f"unknown method '{algorithm}'")
     _check(fidelity in FIDELITIES, path, f"unknown fidelity '{fidelity}'")
     _check(meta["status"] == "diverged" or meta["steps"] >= wanted, path,
            f"done after {meta['steps']} of {wanted} steps")
+
+    own = dict(config.get("switches", {})) | dict(config.get("algo", {}).get(algorithm, {}))
+    whole = standard(path.parts[-5], fidelity, task, algorithm, task in PAIRS) or own
+    for difference in differences(own, whole | settings_of(path.parts[-4])):
+        raise DamagedFile(f"{path}:1: another configuration than its place's: {difference}")
 
     settings = {name: value for name, value in _flat(config) if name not in NO_SETTINGS}
     step, ret, usage, duration = _read_curve(path.with_suffix(".csv"), meta["steps"])
@@ -221,16 +248,23 @@ def _read_curve(path: Path, steps: int) -> tuple[np.ndarray, np.ndarray, np.ndar
     return step, table[:, 1], table[:, 2:2 + K], table[:, 2 + K:]
 
 
-def _cell(runs: list[Run]) -> Cell:
-    newest = max(run.revision for run in runs)
-    kept = tuple(run for run in runs if run.revision == newest)
-    first = kept[0]
-    for run in kept[1:]:
-        for name in sorted(first.settings.keys() & run.settings.keys()):
-            if first.settings[name] != run.settings[name]:
-                raise DamagedFile(f"{run.path}:1: {name} = {run.settings[name]}, but "
-                                  f"{first.settings[name]} in {first.path}")
-    return Cell(kept, len(runs) - len(kept))
+def _cell(runs: list[Run], bad: list[str]) -> Cell:
+    newest = [run for run in runs if run.revision == max(run.revision for run in runs)]
+    most = max(newest, key=lambda run: sum(_unlike(run, other) is None for other in newest))
+    kept = []
+    for run in newest:
+        if (name := _unlike(run, most)) is None:
+            kept.append(run)
+        else:
+            bad.append(f"{run.path}:1: {toml(name.split('.')[-1], run.settings[name])}, but "
+                       f"{most.settings[name]} in {most.path}")
+    return Cell(tuple(kept), len(runs) - len(newest))
+
+
+def _unlike(a: Run, b: Run) -> str | None:
+    """A setting in which two runs differ. One that a record does not name is not compared."""
+    names = sorted(a.settings.keys() & b.settings.keys())
+    return next((name for name in names if a.settings[name] != b.settings[name]), None)
 
 
 def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, Any]]:

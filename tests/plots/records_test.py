@@ -1,3 +1,4 @@
+import csv
 import json
 import tempfile
 import unittest
@@ -5,12 +6,21 @@ from pathlib import Path
 
 import numpy as np
 
-from plots.records import DamagedFile, Key, load_cells
+from plots.records import METHODS, DamagedFile, Key, load_cells
 from plots.samples import author_samples, mean_duration, original_code, our_samples
 from plots.tables import read_bench, read_interpretations, read_rows, read_switches
 from tree import ROOT, write_run
 
 TASK = "Hopper-v2"
+
+
+def strictly(results: Path):
+    """load_cells, but the first record that is left out is an error."""
+    refused = []
+    cells = load_cells(results, refused=refused)
+    if refused:
+        raise DamagedFile(refused[0])
+    return cells
 
 
 class InFolder(unittest.TestCase):
@@ -20,7 +30,7 @@ class InFolder(unittest.TestCase):
         self.results = Path(folder.name) / "results"
         self.results.mkdir()
 
-    def refuses(self, message: str, read=load_cells):
+    def refuses(self, message: str, read=strictly):
         with self.assertRaisesRegex(DamagedFile, message):
             read(self.results)
 
@@ -99,7 +109,37 @@ class RecordsTest(InFolder):
     def test_settings_that_differ_within_a_cell_are_refused(self):
         self.run_of(0, [1])
         self.run_of(1, [1], settings="hidden = 128")
-        self.refuses(r"seed-001\.json:1: algo\.ppo\.hidden = 128, but 64 in .*seed-000\.json")
+        self.refuses(r"seed-001\.json:1: .*hidden = 128, not hidden = 64")
+        self.run_of(3, [1], experiment="mine", settings="hidden = 32")
+        self.run_of(4, [1], experiment="mine", settings="hidden = 32")
+        self.run_of(0, [1], experiment="mine", settings="hidden = 16")
+        refused = []
+        cell, = load_cells(self.results, ["mine"], refused).values()
+        self.assertEqual([run.seed for run in cell.runs], [3, 4])
+        self.assertRegex(refused[0], r"seed-000\.json:1: hidden = 16, but 32 in .*seed-003\.json")
+
+    def test_verdicts_are_those_of_the_program(self):
+        folder = ROOT / "tests" / "data" / "records"
+        with (folder / "verdicts.csv").open() as file:
+            reasons = {row["file"]: row["reason"] for row in csv.DictReader(file)}
+        for experiment in ("single_task", "mine"):
+            refused = []
+            cells = load_cells(folder, [experiment], refused)
+            for message in refused:
+                path = message[:message.index(".json:") + 5] if ".json:" in message else \
+                    message[:message.index(".csv:")] + ".json"
+                name = str(Path(path).relative_to(folder))
+                self.assertTrue(reasons[name], message)
+                self.assertIn(reasons[name], message)
+            good = {f for f, reason in reasons.items() if f.startswith(experiment) and not reason}
+            found = {str(r.path.relative_to(folder)) for c in cells.values() for r in c.runs}
+            self.assertEqual(found, good)
+
+    def test_records_of_format_1_of_every_method_stay_readable(self):
+        refused = []
+        cells = load_cells(ROOT / "tests" / "data" / "records", ["format-1"], refused)
+        self.assertEqual(refused, [])
+        self.assertEqual({key.algorithm for key in cells}, set(METHODS))
 
     def test_unknown_places_are_refused(self):
         write_run(self.results, "Hopper-v3", "ppo", 0, [1])

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from plots.records import PAIRS
+from plots.standard import settings_of
 
 ROOT = Path(__file__).parents[2]
 
@@ -25,12 +26,13 @@ def write_run(results: Path, task: str, algorithm: str, seed: int, returns: Sequ
     wanted = more.pop("wanted", steps)
     settings = more.pop("settings", "hidden = 64")
     folder = results / experiment / fidelity / task / algorithm
+    timelimit = settings_of(fidelity).get("timelimit")
     fidelity = fidelity.partition("-")[0]
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"seed-{seed:03d}.json"
     config = (f'[run]\ntask = "{PAIRS.get(task, task)}"\nalgorithm = "{algorithm}"\n'
               f'fidelity = "{fidelity}"\nseed = {seed}\nsteps = {wanted}\n'
-              f'[switches]\ntimelimit = "{fidelity}"\n[algo.{algorithm}]\n{settings}\n')
+              f'[switches]\ntimelimit = "{timelimit or fidelity}"\n[algo.{algorithm}]\n{settings}\n')
     path.write_text(json.dumps({
         "status": status, "steps": steps, "commit": "0" * 40, "compiler": "GNU 12", "flags": "-O3",
         "versions": {"eigen": "3.4.0"}, "config": config} | more))
