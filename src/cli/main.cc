@@ -396,6 +396,20 @@ void AddRecord(CLI::App& app) {
   });
 }
 
+/// Records that do not count, on standard error, and how many they are.
+void NameRefused(const std::vector<std::string>& refused) {
+  for (const std::string& reason : refused) std::cerr << reason << "\n";
+  if (!refused.empty()) std::cerr << refused.size() << " records refused\n";
+}
+
+std::vector<std::string> RefusedOf(const std::vector<Job>& jobs) {
+  std::vector<std::string> refused;
+  for (const Job& job : jobs) {
+    if (!job.refused.empty()) refused.push_back(job.refused);
+  }
+  return refused;
+}
+
 /// Options that name a grid of runs, of `jobs` and `progress`.
 struct GridOptions {
   JobQuery query;
@@ -428,13 +442,16 @@ void AddJobs(CLI::App& app, const std::string& program) {
       "that an\nolder revision of a method's code made are named on standard error.\n"
       "Example:\n  option2vec jobs quick --seeds 0-4 | xargs -P 2 -d '\\n' -n 1 sh -c");
   jobs->callback([opt] {
-    for (const Job& job : opt->List()) {
+    const std::vector<Job> list = opt->List();
+    for (const Job& job : list) {
+      if (!job.refused.empty()) continue;
       if (!job.finished) {
         std::cout << job.command << "\n";
       } else if (job.old) {
         std::cerr << Printable(job.dir.string()) << ": by an older revision of the method\n";
       }
     }
+    NameRefused(RefusedOf(list));
   });
 }
 
@@ -449,8 +466,11 @@ void AddProgress(CLI::App& app) {
   progress->footer(
       "The time left is what finished runs of the same kind took.\n"
       "Example:\n  option2vec progress single_task transfer --fidelity paper --at-once 2");
-  progress->callback(
-      [opt] { std::cout << ToString(MeasureProgress(opt->List()), opt->at_once) << "\n"; });
+  progress->callback([opt] {
+    const std::vector<Job> list = opt->List();
+    std::cout << ToString(MeasureProgress(list), opt->at_once) << "\n";
+    NameRefused(RefusedOf(list));
+  });
 }
 
 void AddSummary(CLI::App& app) {
@@ -463,7 +483,9 @@ void AddSummary(CLI::App& app) {
       "Example:\n  option2vec summary results/quick");
   summary->callback([folders] {
     for (const std::string& folder : *folders) {
-      const auto rows = Summarize(folder);
+      const auto [rows, refused] = Summarize(folder);
+      NameRefused(refused);
+      if (rows.empty()) throw ConfigError(folder + ": no record of a finished run");
       WriteFileAtomically(std::filesystem::path(folder) / "summary.csv", SummaryCsv(rows));
       std::cout << folder << "\n" << SummaryTable(rows) << "\n";
     }

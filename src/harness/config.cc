@@ -33,6 +33,7 @@ struct Layer {
   Table run;       // [run]
   Table switches;  // [switches]
   Table hyper;     // [algo.<method>]; also `workers`, which depends on the method
+  int format = 1;  // of the file, see AddedKey
 };
 
 /// What conditional tables are asked about.
@@ -48,6 +49,7 @@ struct Scope {
 const std::vector<std::string> kRunNumbers = {"steps", "checkpoint_every", "eval_every",
                                               "eval_episodes"};
 const std::vector<std::string> kRunWords = {"task", "algorithm", "fidelity"};
+constexpr const char* kFormatKey = "format";
 constexpr const char* kCommandLine = "command line";  // the origin of what no file gives
 const std::vector<std::string> kFidelities = {"paper", "released"};
 const std::vector<std::string> kSuites = {"gym", "dm", "transfer"};
@@ -143,15 +145,36 @@ void Flatten(const ConfigText& file, const toml::table* section, const Scope& sc
   }
 }
 
-Layer ReadLayer(const ConfigText& file, const Scope& scope) {
+/// The format of configurations that has all keys of the table.
+int LastFormat(const std::vector<AddedKey>& added) {
+  int last = 1;
+  for (const AddedKey& key : added) last = std::max(last, key.since);
+  return last;
+}
+
+/// The format that the file says it has. Throws ConfigError for one of a newer program.
+int ReadFormat(const ConfigText& file, const toml::table& root, int last) {
+  const toml::node* node = root.get(kFormatKey);
+  if (!node) return 1;
+  const std::int64_t format = node->value_exact<std::int64_t>().value_or(0);
+  if (format < 1 || format > last) {
+    throw ConfigError(Concat(Origin(file, *node), ": format ", format,
+                             " of configurations: this program reads 1 to ", last));
+  }
+  return static_cast<int>(format);
+}
+
+Layer ReadLayer(const ConfigText& file, const Scope& scope,
+                const std::vector<AddedKey>& added = AddedKeys()) {
   const toml::table root = Parse(file);
-  const std::vector<std::string> sections = {"run", "switches", "algo", "experiment"};
+  const std::vector<std::string> sections = {"run", "switches", "algo", "experiment", kFormatKey};
   for (const auto& [key, node] : root) {
     if (!Contains(sections, key.str())) {
       Unknown(Origin(file, node), "section", key.str(), sections);
     }
   }
   Layer layer;
+  layer.format = ReadFormat(file, root, LastFormat(added));
   Flatten(file, Section(file, root, "run"), scope, layer.run);
   Flatten(file, Section(file, root, "switches"), scope, layer.switches);
   if (const toml::table* algo = Section(file, root, "algo")) {
@@ -346,6 +369,27 @@ Scalar FromText(const std::string& text, std::string origin) {
   return {text, std::move(origin)};
 }
 
+/// Whether the file is a resolved configuration: such a one alone says all of [run].
+bool IsResolved(const Table& run) {
+  const auto keys = Union({kRunWords, kRunNumbers, {"seed"}});
+  return std::all_of(keys.begin(), keys.end(), [&](const auto& key) { return run.contains(key); });
+}
+
+/// Completes a resolved configuration of an older format.
+void AddHistory(const std::vector<AddedKey>& added, const Scope& scope, Layer& layer) {
+  const auto switches = SwitchNames(Named(scope));
+  for (const AddedKey& key : added) {
+    if (key.since <= layer.format) continue;
+    const Scalar value =
+        FromText(key.value, Concat("history of '", key.key, "', format ", key.since));
+    if (key.section == "run") layer.run.emplace(key.key, value);
+    if (key.section == "switches" && Contains(switches, key.key)) {
+      layer.switches.emplace(key.key, value);
+    }
+    if (key.section == scope.algorithm) layer.hyper.emplace(key.key, value);
+  }
+}
+
 void ApplySet(const std::string& assignment, const std::vector<std::string>& switches,
               const Table& known_hyper, Layer& layer) {
   const std::string origin = "--set " + assignment;
@@ -366,6 +410,12 @@ void ApplySet(const std::string& assignment, const std::vector<std::string>& swi
 }
 
 }  // namespace
+
+const std::vector<AddedKey>& AddedKeys() {
+  // {section, key, value that every run before had, first format that has the key}
+  static const std::vector<AddedKey> added = {};
+  return added;
+}
 
 bool Concerns(const SwitchInfo& info, const RunConfig& config) {
   return info.Concerns(config.algorithm) && (!info.transfer || SplitTasks(config.task).size() > 1);
@@ -390,7 +440,16 @@ ConfigText OpenConfig(const std::string& config) {
   Unknown("config", "name", config, names);
 }
 
-RunConfig ResolveRun(const RunRequest& request) {
+std::optional<ConfigText> FindSuite(const std::string& name) {
+  for (const auto& [file, text] : Embedded_configs()) {
+    if (file != name + ".toml") continue;
+    ConfigText config{Concat("paper_configs/", file), std::string(text)};
+    if (Parse(config).contains("experiment")) return config;
+  }
+  return std::nullopt;
+}
+
+RunConfig ResolveRun(const RunRequest& request, const std::vector<AddedKey>& added) {
   Table options;
   auto option = [&](const char* key, const char* name, const auto& value) {
     if (value) options[key] = {*value, name};
@@ -404,14 +463,18 @@ RunConfig ResolveRun(const RunRequest& request) {
   std::vector<ConfigText> files = {OpenConfig("run")};
   if (request.config) files.push_back(*request.config);
   Table names;  // plain keys only: no conditional table can name the run that it depends on
-  for (const ConfigText& file : files) Put(ReadLayer(file, {}).run, names);
+  for (const ConfigText& file : files) Put(ReadLayer(file, {}, added).run, names);
   Put(options, names);
   const Scope scope = CheckedScope(names, kCommandLine);
 
   const Layer method = MethodLayer(scope);
   Layer layer = ReadLayer(files[0], scope);
   Put(method, layer);
-  if (request.config) Put(ReadLayer(files[1], scope), layer);
+  if (request.config) {
+    Layer own = ReadLayer(files[1], scope, added);
+    if (IsResolved(own.run)) AddHistory(added, scope, own);
+    Put(own, layer);
+  }
   Put(options, layer.run);
   for (const std::string& assignment : request.set) {
     ApplySet(assignment, SwitchNames(Named(scope)), method.hyper, layer);
@@ -419,12 +482,14 @@ RunConfig ResolveRun(const RunRequest& request) {
   return Build(layer, scope, method.hyper, kCommandLine);
 }
 
-std::string ToToml(const RunConfig& config) {
-  std::string text = Concat(
-      "[run]\ntask = \"", config.task, "\"\nalgorithm = \"", config.algorithm, "\"\nfidelity = \"",
-      ToString(config.fidelity), "\"\nseed = ", config.seed, "\nsteps = ", config.steps,
-      "\ncheckpoint_every = ", config.checkpoint_every, "\neval_every = ", config.eval_every,
-      "\neval_episodes = ", config.eval_episodes, "\n\n[switches]\n");
+std::string ToToml(const RunConfig& config, const std::vector<AddedKey>& added) {
+  const int format = LastFormat(added);
+  std::string text = format == 1 ? "" : Concat(kFormatKey, " = ", format, "\n\n");
+  text += Concat("[run]\ntask = \"", config.task, "\"\nalgorithm = \"", config.algorithm,
+                 "\"\nfidelity = \"", ToString(config.fidelity), "\"\nseed = ", config.seed,
+                 "\nsteps = ", config.steps, "\ncheckpoint_every = ", config.checkpoint_every,
+                 "\neval_every = ", config.eval_every, "\neval_episodes = ", config.eval_episodes,
+                 "\n\n[switches]\n");
   for (const SwitchInfo& info : SwitchRegistry()) {
     if (!Concerns(info, config)) continue;
     text += Concat(info.name, " = ",
@@ -443,10 +508,12 @@ std::string ToToml(const RunConfig& config) {
   return text;
 }
 
-RunConfig ParseRunConfig(const std::string& text, const std::string& file_name) {
+RunConfig ParseRunConfig(const std::string& text, const std::string& file_name,
+                         const std::vector<AddedKey>& added) {
   const ConfigText file{file_name, text};
-  const Scope scope = CheckedScope(ReadLayer(file, {}).run, file_name);
-  const Layer layer = ReadLayer(file, scope);
+  const Scope scope = CheckedScope(ReadLayer(file, {}, added).run, file_name);
+  Layer layer = ReadLayer(file, scope, added);
+  AddHistory(added, scope, layer);
   for (const std::string& name : SwitchNames(Named(scope))) {
     Need(layer.switches, file_name, name);
   }

@@ -46,19 +46,34 @@ struct RunRequest {
   std::vector<std::string> set;  // "key=value": a method's number, a switch, or a number of [run]
 };
 
+/// A key that was added after runs had been kept. A resolved configuration of an older format,
+/// which lacks it, means the run with `value`: what every such run did.
+struct AddedKey {
+  std::string section;  // "run", "switches" or a method's id
+  std::string key;
+  std::string value;  // as --set takes it
+  int since;          // first format of configurations that has the key; those of 1 say no format
+};
+/// All of them. A new switch, or a new number of a method, takes one row.
+const std::vector<AddedKey>& AddedKeys();
+
+/// The experiment of this name that is compiled into the program: quick, single_task, ...
+std::optional<ConfigText> FindSuite(const std::string& name);
+
 /// Whether the run's method reads the switch; those of transfer only in a run over several tasks.
 bool Concerns(const SwitchInfo& info, const RunConfig& config);
 
 /// Layers, later ones win: run.toml, algo/<method>.toml, `config`, the request, its `set`. Throws
 /// ConfigError naming file, line and key for an unknown, missing or mistyped key.
-RunConfig ResolveRun(const RunRequest& request);
+RunConfig ResolveRun(const RunRequest& request, const std::vector<AddedKey>& added = AddedKeys());
 
 /// The run as TOML that `config` and ParseRunConfig read back to the same run, bit for bit.
-std::string ToToml(const RunConfig& config);
+std::string ToToml(const RunConfig& config, const std::vector<AddedKey>& added = AddedKeys());
 
-/// Reads what ToToml wrote; every key must be there. `file_name` is for messages. Throws
-/// ConfigError.
-RunConfig ParseRunConfig(const std::string& text, const std::string& file_name);
+/// Reads what ToToml wrote, also in an older format; every other key must be there. `file_name` is
+/// for messages. Throws ConfigError.
+RunConfig ParseRunConfig(const std::string& text, const std::string& file_name,
+                         const std::vector<AddedKey>& added = AddedKeys());
 
 /// The run's method on a task of these sizes. Throws ConfigError when a number was not read by it.
 /// `draw_weights` false: its weights stay zero, to be counted.

@@ -27,12 +27,16 @@ std::string Quoted(const std::string& word) {
 }
 
 /// Marks a run that is finished, by its record: the folder may be on another machine.
-void MarkFinished(Job& job) {
-  const std::optional<Record> record = FindRecord(job.dir, ToToml(job.config));
-  if (!record) return;
-  job.finished = record->status;
-  job.cpu_seconds = record->cpu_seconds;
-  job.old = record->revision < FindAlgorithm(job.config.algorithm).revision;
+void MarkFinished(const std::vector<AddedKey>& added, Job& job) {
+  try {
+    if (!FindRecord(job.dir, ToToml(job.config), added)) return;
+    const Record run = ReadRecord(RecordPath(job.dir, ".json"), added);
+    job.finished = run.status;
+    job.cpu_seconds = run.cpu_seconds;
+    job.old = run.revision < FindAlgorithm(job.config.algorithm).revision;
+  } catch (const Error& e) {
+    job.refused = e.what();
+  }
 }
 
 }  // namespace
@@ -103,7 +107,7 @@ std::vector<Job> ListJobs(const JobQuery& query) {
         Concat(Quoted(query.program), " train --config ", Quoted(query.configs[e]), " --task ",
                task, " --algo ", algorithm, " --fidelity ", fidelity, set, " --seed ", seed,
                " --steps ", job.config.steps, " --out ", Quoted(job.dir.string()), " --resume");
-    MarkFinished(job);
+    MarkFinished(query.added, job);
     jobs.push_back(std::move(job));
   };
   for (std::size_t i = 0; i < most_seeds; ++i) {
@@ -149,6 +153,7 @@ Progress MeasureProgress(const std::vector<Job>& jobs) {
   for (const Job& job : jobs) {
     kinds.insert(kind_of(job));
     ++progress.runs;
+    progress.refused += !job.refused.empty();
     if (!job.finished) continue;
     ++progress.finished;
     progress.old += job.old;
@@ -165,7 +170,7 @@ Progress MeasureProgress(const std::vector<Job>& jobs) {
   if (of_all.steps == 0) return progress;
   double left = 0;
   for (const Job& job : jobs) {
-    if (job.finished) continue;
+    if (job.finished || !job.refused.empty()) continue;
     const auto kind = of_kind.find(kind_of(job));
     const auto task = of_task.find(job.config.task);
     const Cost& cost = kind != of_kind.end()   ? kind->second
@@ -181,7 +186,8 @@ std::string ToString(const Progress& progress, int at_once) {
   std::string text = Concat(progress.runs, " runs: ", progress.finished, " done");
   if (progress.diverged > 0) text += Concat(" (", progress.diverged, " diverged)");
   if (progress.old > 0) text += Concat(" (", progress.old, " by older revisions of their methods)");
-  const int left = progress.runs - progress.finished;
+  if (progress.refused > 0) text += Concat(", ", progress.refused, " with a refused record");
+  const int left = progress.runs - progress.finished - progress.refused;
   text += Concat(", ", left, " left");
   if (left == 0) return text;
   if (!progress.cpu_seconds_left) return text + ", time left known after the first";

@@ -20,6 +20,7 @@ struct JobQuery {
   std::filesystem::path results = "results";
   std::vector<std::string> tasks, algorithms, fidelities;
   std::vector<std::uint64_t> seeds;
+  std::vector<AddedKey> added = AddedKeys();  // by which older records are read
 };
 
 /// One run.
@@ -31,6 +32,8 @@ struct Job {
   std::optional<RunStatus> finished;  // done or diverged: nothing is left to do
   bool old = false;                   // finished by an older revision of the method's code
   double cpu_seconds = 0;             // that a finished run took
+  std::string refused;                // why its record does not count: a person must look at it,
+                                      // the run is neither finished nor left
 };
 
 /// The last folder of a run's path: seed-003.
@@ -38,13 +41,14 @@ std::string SeedFolder(std::uint64_t seed);
 
 /// The product of each experiment's lists, seeds outermost over all experiments, so that whatever
 /// has finished is a balanced comparison. All configs are resolved here. Throws ConfigError for a
-/// bad config, for a run that was finished with another one, and for half a record.
+/// bad config. A record that is damaged, half or of another configuration is refused alone.
 std::vector<Job> ListJobs(const JobQuery& query);
 
 /// How far a grid of runs has come.
 struct Progress {
   int runs = 0, finished = 0;
   int diverged = 0, old = 0;               // of the finished ones; see Job
+  int refused = 0;                         // by their records
   int kinds = 0, timed = 0;                // kinds of runs; those with a finished run
   std::optional<double> cpu_seconds_left;  // estimate; nothing when no run has finished
 };

@@ -3,16 +3,21 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "base/check.h"
 #include "base/decimal.h"
 #include "base/files.h"
+#include "env/pairs.h"
+#include "harness/jobs.h"
 
 namespace o2v {
 namespace {
 
+namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
+constexpr std::int64_t kFormat = 1;  // of a record's files
 constexpr std::string_view kFirstColumns = "step,return_20";
 constexpr std::int64_t kGrid = 10'000;  // [environment steps] ours: 100 rows a million steps
 
@@ -53,11 +58,55 @@ OptionCount CountOption(const CsvTable& updates, const OptionColumns& option, st
   return count;
 }
 
+/// A whole number of a JSON object.
+std::int64_t Whole(const ordered_json& in, const char* key) {
+  const ordered_json& x = in.at(key);
+  const std::int64_t value = x.is_number_integer() ? x.get<std::int64_t>() : -1;
+  Check(value >= 0, "'", key, "' is ", x.dump(), ", not a whole number");
+  return value;
+}
+
+/// Step and return of each row of a RecordCsv. Cells of options may be empty.
+std::vector<CurvePoint> ReadCurve(const fs::path& csv, std::int64_t steps) {
+  const CsvTable table = ReadCsv(csv, {.rows = true, .cells = true});
+  const std::size_t step = table.Column("step"), ret = table.Column("return_20");
+  std::vector<CurvePoint> curve;
+  double before = 0;
+  for (std::size_t row = 0; row < table.Rows(); ++row) {
+    const double at = table.At(row, step), value = table.At(row, ret);
+    Check(at == std::floor(at) && at > before && at <= static_cast<double>(steps),
+          table.Place(row, step), "expected a whole number above ", before, ", at most ", steps);
+    Check(std::isfinite(value), table.Place(row, ret), "expected a number");
+    curve.emplace_back(static_cast<std::int64_t>(at), value);
+    before = at;
+  }
+  return curve;
+}
+
+/// What the name of a folder says: "paper-o2v_dropout=0.2-hidden=8".
+struct Variant {
+  std::string fidelity;
+  std::vector<std::string> set;  // "o2v_dropout=0.2", "hidden=8"
+};
+
+/// A value may hold a hyphen (1e-08), a key does not: a part without '=' belongs to the one before.
+Variant ParseVariant(const std::string& folder) {
+  Variant variant;
+  std::istringstream in(folder);
+  std::getline(in, variant.fidelity, '-');
+  for (std::string part; std::getline(in, part, '-');) {
+    if (part.find('=') == std::string::npos && !variant.set.empty()) {
+      variant.set.back() += "-" + part;
+    } else {
+      variant.set.push_back(part);
+    }
+  }
+  return variant;
+}
+
 }  // namespace
 
-std::filesystem::path RecordPath(std::filesystem::path dir, const char* ending) {
-  return FolderPath(dir) += ending;
-}
+fs::path RecordPath(fs::path dir, const char* ending) { return FolderPath(dir) += ending; }
 
 std::string RecordCsv(std::span<const CurvePoint> episodes, const CsvTable& updates,
                       std::int64_t steps) {
@@ -94,7 +143,7 @@ std::string RecordCsv(std::span<const CurvePoint> episodes, const CsvTable& upda
 
 std::string RecordJson(const std::string& manifest_json, const std::string& config) {
   const ordered_json manifest = ordered_json::parse(manifest_json);
-  ordered_json out;
+  ordered_json out = {{"format", kFormat}};
   for (const char* key : {"status", "steps", "revision", "wall_seconds", "cpu_seconds", "commit",
                           "compiler", "flags", "versions"}) {
     if (manifest.contains(key)) out[key] = manifest[key];
@@ -103,8 +152,7 @@ std::string RecordJson(const std::string& manifest_json, const std::string& conf
   return out.dump(2) + "\n";
 }
 
-void WriteRecord(const std::filesystem::path& dir, const std::string& manifest_json,
-                 std::int64_t wanted_steps) {
+void WriteRecord(const fs::path& dir, const std::string& manifest_json, std::int64_t wanted_steps) {
   const auto steps = ordered_json::parse(manifest_json).at("steps").get<std::int64_t>();
   WriteFileAtomically(RecordPath(dir, ".csv"),
                       RecordCsv(ReadEpisodes(dir / "episodes.csv"),
@@ -113,54 +161,115 @@ void WriteRecord(const std::filesystem::path& dir, const std::string& manifest_j
                       RecordJson(manifest_json, ReadFile(dir / "config.toml")));
 }
 
-Record ReadRecord(const std::filesystem::path& path) {
+RecordHead ReadRecordHead(const fs::path& json) {
   try {
-    const ordered_json in = ordered_json::parse(ReadFile(path));
-    return {ParseStatus(in.at("status").get<std::string>()), in.at("steps").get<std::int64_t>(),
-            in.value("revision", 1), in.at("cpu_seconds").get<double>(),
-            in.at("config").get<std::string>()};
+    const ordered_json in = ordered_json::parse(ReadFile(json));
+    const std::int64_t format = in.contains("format") ? Whole(in, "format") : 1;
+    Check(format == kFormat, "format ", format, "; this program reads ", kFormat);
+    return {ParseStatus(in.at("status").get<std::string>()), Whole(in, "steps"),
+            in.contains("revision") ? static_cast<int>(Whole(in, "revision")) : 1,
+            in.value("cpu_seconds", 0.0), in.at("config").get<std::string>()};
   } catch (const std::exception& e) {
-    throw Error(Concat(path.string(), ": cannot be read: ", e.what()));
+    throw Error(Concat(json.string(), ": ", e.what()));
   }
 }
 
-std::optional<Record> FindRecord(const std::filesystem::path& dir, const std::string& config) {
-  const std::filesystem::path json = RecordPath(dir, ".json");
+Record ReadRecord(const fs::path& json, const std::vector<AddedKey>& added) {
+  Record record{ReadRecordHead(json), {}, {}};
+  try {
+    record.config = ParseRunConfig(record.config_text, "config", added);
+    const std::int64_t wanted = record.config.steps;
+    Check(record.status == RunStatus::kDone || record.status == RunStatus::kDiverged, "status ",
+          ToString(record.status));
+    Check(record.status == RunStatus::kDiverged || record.steps >= wanted, "done after ",
+          record.steps, " of ", wanted, " steps");
+    record.curve = ReadCurve(fs::path(json).replace_extension(".csv"), record.steps);
+    return record;
+  } catch (const std::exception& e) {
+    throw Error(Concat(json.string(), ": ", e.what()));
+  }
+}
+
+void RequirePlace(const fs::path& json, const std::string& experiment, const RunConfig& config) {
+  try {
+    const fs::path method = json.parent_path(), task = method.parent_path();
+    const auto agree = [](const fs::path& place, const std::string& content) {
+      Check(place == content, "lies in the place of ", place, ", but is of ", content);
+    };
+    agree(json.filename(), SeedFolder(config.seed) + ".json");
+    agree(method.filename(), config.algorithm);
+    agree(task.filename(), TasksName(SplitTasks(config.task)));
+    const Variant variant = ParseVariant(task.parent_path().filename().string());
+    agree(variant.fidelity, ToString(config.fidelity));
+    RunRequest request;
+    request.config = FindSuite(experiment);
+    if (!request.config) request.config = ConfigText{json.string(), ToToml(config)};
+    request.task = config.task;
+    request.algorithm = config.algorithm;
+    request.fidelity = ToString(config.fidelity);
+    request.steps = config.steps;
+    request.set = variant.set;
+    const std::string difference = Difference(config, ResolveRun(request));
+    Check(difference.empty(), "lies in the place of another configuration: ", difference);
+  } catch (const std::exception& e) {
+    throw Error(Concat(json.string(), ": ", e.what()));
+  }
+}
+
+std::string Difference(const RunConfig& a, const RunConfig& b) {
+  RunConfig like_b = a;
+  like_b.seed = b.seed;
+  like_b.checkpoint_every = b.checkpoint_every;
+  like_b.eval_every = b.eval_every;
+  like_b.eval_episodes = b.eval_episodes;
+  std::istringstream lines_a(ToToml(like_b)), lines_b(ToToml(b));
+  for (std::string line_a, line_b;;) {
+    const bool more_a = static_cast<bool>(std::getline(lines_a, line_a));
+    const bool more_b = static_cast<bool>(std::getline(lines_b, line_b));
+    if (!more_a && !more_b) return "";
+    if (!more_a || !more_b || line_a != line_b) return Concat(line_a, ", not ", line_b);
+  }
+}
+
+std::optional<RecordHead> FindRecord(const fs::path& dir, const std::string& config,
+                                     const std::vector<AddedKey>& added) {
+  const fs::path json = RecordPath(dir, ".json");
   std::error_code error;  // a name that is too long is nobody's
-  if (!std::filesystem::exists(json, error)) return std::nullopt;
-  if (const auto csv = RecordPath(dir, ".csv"); !std::filesystem::exists(csv)) {
+  if (!fs::exists(fs::symlink_status(json, error))) return std::nullopt;
+  if (const auto csv = RecordPath(dir, ".csv"); !fs::exists(csv, error)) {
     throw ConfigError(Concat(csv.string(), ": missing; a record is a pair of files, this and ",
                              json.filename().string(), ": write both with `option2vec record ",
                              dir.string(), "`, or move the other away to run it again"));
   }
-  const Record record = ReadRecord(json);
-  if (record.config != config) {
+  const RecordHead head = ReadRecordHead(json);
+  if (head.config_text != config &&
+      ToToml(ParseRunConfig(head.config_text, json.string(), added)) != config) {
     throw ConfigError(Concat(json.string(), ": this run was finished with another ",
                              "configuration; move it away to run it again"));
   }
-  return record;
+  return head;
 }
 
-void RequireRecordPlace(const std::filesystem::path& dir, const std::string& config, bool begun) {
+void RequireRecordPlace(const fs::path& dir, const std::string& config, bool begun) {
   constexpr std::size_t kLongestName = 255;  // [bytes] of most file systems
-  const std::filesystem::path json = RecordPath(dir, ".json"), csv = RecordPath(dir, ".csv");
+  const fs::path json = RecordPath(dir, ".json"), csv = RecordPath(dir, ".csv");
   const std::size_t longest = json.filename().string().size() + sizeof ".tmp" - 1;
   if (longest > kLongestName) {
     throw ConfigError(Concat(dir.string(), ": its record's name would have ", longest,
                              " bytes, more than ", kLongestName));
   }
-  const auto own = [&](const std::filesystem::path& path) {
+  const auto own = [&](const fs::path& path) {
     try {
       return path == csv ? ReadFile(path).starts_with(kFirstColumns)
-                         : ReadRecord(path).config == config;
+                         : ReadRecordHead(path).config_text == config;
     } catch (const Error&) {
       return false;
     }
   };
   std::error_code error;
-  for (const std::filesystem::path& path : {json, csv}) {
-    if (!std::filesystem::exists(std::filesystem::symlink_status(path, error))) continue;
-    if (!begun || !std::filesystem::is_regular_file(path) || !own(path)) {
+  for (const fs::path& path : {json, csv}) {
+    if (!fs::exists(fs::symlink_status(path, error))) continue;
+    if (!begun || !fs::is_regular_file(path) || !own(path)) {
       throw ConfigError(path.string() +
                         ": is in the place of this run's record; move it away first");
     }

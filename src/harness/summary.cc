@@ -10,11 +10,9 @@
 
 #include "base/align.h"
 #include "base/check.h"
-#include "base/csv.h"
 #include "base/files.h"
 #include "embedded/reference.h"
 #include "env/pairs.h"
-#include "harness/config.h"
 #include "harness/record.h"
 
 namespace o2v {
@@ -52,51 +50,56 @@ std::vector<std::vector<std::string>> ReferenceRows(std::string_view name) {
   return rows;
 }
 
-/// One run's record.
-struct RunRecord {
-  Record meta;
-  std::int64_t wanted_steps;      // of its config
-  std::int64_t tasks;             // that they are spent on, one after the other
-  std::vector<CurvePoint> curve;  // smoothed returns, by step; empty: fewer than 20 episodes
-};
+using Key = std::tuple<std::string, std::string, std::string>;  // fidelity, task, algorithm
 
-/// Step and return of each row of a RecordCsv. Cells of options may be empty.
-std::vector<CurvePoint> ReadCurve(const fs::path& csv) {
-  const CsvTable table = ReadCsv(csv, {.rows = true, .cells = true});
-  const std::size_t step = table.Column("step"), ret = table.Column("return_20");
-  std::vector<CurvePoint> curve;
-  for (std::size_t row = 0; row < table.Rows(); ++row) {
-    const double at = table.At(row, step), value = table.At(row, ret);
-    Check(at == std::floor(at), table.Place(row, step), "expected a whole number");
-    Check(std::isfinite(value), table.Place(row, ret), "expected a number");
-    curve.emplace_back(static_cast<std::int64_t>(at), value);
+/// The records `depth` folders below `dir`: .json files.
+void FindRecords(const fs::path& dir, int depth, std::vector<fs::path>& found) {
+  std::vector<fs::path> inside;
+  for (const auto& entry : fs::directory_iterator(dir)) inside.push_back(entry.path());
+  std::sort(inside.begin(), inside.end());
+  for (const fs::path& path : inside) {
+    if (path.filename().string().starts_with('.')) continue;
+    std::error_code error;  // of a link in a circle: no folder
+    if (depth > 0 && fs::is_directory(path, error)) FindRecords(path, depth - 1, found);
+    if (depth == 0 && path.extension() == ".json") found.push_back(path);
   }
-  return curve;
 }
 
-RunRecord ReadRun(const fs::path& json) {
-  RunRecord run;
-  run.meta = ReadRecord(json);
-  const RunConfig config = ParseRunConfig(run.meta.config, json.string());
-  run.wanted_steps = config.steps;
-  run.tasks = static_cast<std::int64_t>(SplitTasks(config.task).size());
-  run.curve = ReadCurve(fs::path(json).replace_extension(".csv"));
-  return run;
+/// The runs that have the most frequent configuration, of several the first one's. The others are
+/// refused.
+std::vector<Record> OfOneConfiguration(const std::map<fs::path, Record>& records,
+                                       std::vector<std::string>& refused) {
+  const auto like = [&](const Record& x) {
+    return std::ranges::count_if(records, [&](const auto& record) {
+      return Difference(record.second.config, x.config).empty();
+    });
+  };
+  const Record* most = nullptr;
+  for (const auto& [file, record] : records) {
+    if (!most || like(record) > like(*most)) most = &record;
+  }
+  std::vector<Record> runs;
+  for (const auto& [file, record] : records) {
+    const std::string difference = Difference(record.config, most->config);
+    if (difference.empty()) {
+      runs.push_back(record);
+    } else {
+      refused.push_back(Concat(file.string(), ": differs from the other runs: ", difference));
+    }
+  }
+  return runs;
 }
 
 /// The row at the end of task `task` (from 1), or of one million steps on it.
-SummaryRow MakeRow(const std::tuple<std::string, std::string, std::string>& key,
-                   const std::vector<RunRecord>& runs, std::int64_t task) {
+SummaryRow MakeRow(const Key& key, const std::vector<Record>& runs, std::int64_t task,
+                   std::int64_t tasks) {
   SummaryRow row;
   std::tie(row.fidelity, row.task, row.algorithm) = key;
-  row.step = kMillion * task;
-  for (const RunRecord& run : runs) {
-    row.step = std::min(row.step, run.wanted_steps * task / run.tasks);
-  }
-  for (const RunRecord& run : runs) {
+  row.step = std::min(kMillion * task, runs[0].config.steps * task / tasks);
+  for (const Record& run : runs) {
     const auto after = std::find_if(run.curve.begin(), run.curve.end(),
                                     [&](const auto& point) { return point.first > row.step; });
-    if (run.meta.status == RunStatus::kDiverged && run.meta.steps < row.step) {
+    if (run.status == RunStatus::kDiverged && run.steps < row.step) {
       ++row.n_diverged;
     } else if (after == run.curve.begin()) {
       ++row.n_short;
@@ -161,32 +164,37 @@ std::optional<Published> PublishedReturn(const std::string& task, const std::str
                    std::lerp(low.std, above->second.std, part), low.n};
 }
 
-std::vector<SummaryRow> Summarize(const fs::path& experiment) {
-  std::map<std::tuple<std::string, std::string, std::string>, std::map<fs::path, RunRecord>> groups;
-  if (fs::is_directory(experiment)) {
-    for (const auto& entry : fs::recursive_directory_iterator(experiment)) {
-      const fs::path file = entry.path(), below = file.lexically_relative(experiment);
-      const std::vector<fs::path> parts(below.begin(), below.end());
-      constexpr std::size_t kDepth = 4;  // fidelity, task, algorithm, seed-003.json
-      if (parts.size() != kDepth || file.extension() != ".json") continue;
-      groups[{parts[0], parts[1], parts[2]}].emplace(file, ReadRun(file));
+ExperimentSummary Summarize(const fs::path& experiment) {
+  ExperimentSummary summary;
+  std::vector<fs::path> files;
+  constexpr int kDepth = 3;  // fidelity, task, algorithm
+  if (fs::is_directory(experiment)) FindRecords(experiment, kDepth, files);
+  const fs::path absolute = fs::absolute(experiment / "").lexically_normal();  // "results/quick/"
+  const std::string name = absolute.parent_path().filename();
+  std::map<Key, std::map<int, std::map<fs::path, Record>>> groups;  // then by revision
+  for (const fs::path& file : files) {
+    try {
+      Record record = ReadRecord(file);
+      RequirePlace(file, name, record.config);
+      const fs::path below = file.lexically_relative(experiment);
+      const std::vector<std::string> parts(below.begin(), below.end());
+      groups[{parts[0], parts[1], parts[2]}][record.revision].emplace(file, std::move(record));
+    } catch (const Error& e) {
+      summary.refused.emplace_back(e.what());
     }
   }
-  if (groups.empty()) throw ConfigError(experiment.string() + ": no record of a finished run");
-  std::vector<SummaryRow> rows;
-  for (const auto& [key, by_file] : groups) {
-    int newest = 0;
-    for (const auto& [file, run] : by_file) newest = std::max(newest, run.meta.revision);
-    std::vector<RunRecord> runs;
-    for (const auto& [file, run] : by_file) {
-      if (run.meta.revision == newest) runs.push_back(run);
-    }
-    for (std::int64_t task = 1; task <= runs[0].tasks; ++task) {
-      rows.push_back(MakeRow(key, runs, task));
-      rows.back().n_older = static_cast<int>(by_file.size() - runs.size());
+  for (const auto& [key, by_revision] : groups) {
+    int all = 0;
+    for (const auto& [revision, records] : by_revision) all += static_cast<int>(records.size());
+    const auto& newest = by_revision.rbegin()->second;
+    const std::vector<Record> runs = OfOneConfiguration(newest, summary.refused);
+    const auto tasks = static_cast<std::int64_t>(SplitTasks(runs[0].config.task).size());
+    for (std::int64_t task = 1; task <= tasks; ++task) {
+      summary.rows.push_back(MakeRow(key, runs, task, tasks));
+      summary.rows.back().n_older = all - static_cast<int>(newest.size());
     }
   }
-  return rows;
+  return summary;
 }
 
 std::string SummaryCsv(const std::vector<SummaryRow>& rows) {

@@ -35,11 +35,18 @@ struct SummaryRow {
   int n_older = 0;             // runs by older revisions of the method's code, left out
 };
 
-/// Reads the records seed-*.csv and seed-*.json below `experiment` (results/quick). `step` of a row
-/// is the end of a task: the least of the runs' own steps there, at most 1 000 000 a task. Of each
-/// row only the runs of the newest revision among them count. Rows sorted by fidelity, task and
-/// method. Throws ConfigError when there is no record at all, Error for a damaged one.
-std::vector<SummaryRow> Summarize(const std::filesystem::path& experiment);
+/// What an experiment's records say.
+struct ExperimentSummary {
+  std::vector<SummaryRow> rows;      // by fidelity, task and method
+  std::vector<std::string> refused;  // of each record that does not count: its file and why
+};
+
+/// Reads the records below `experiment` (results/quick), through links, without hidden files. A
+/// record counts when it lies where it belongs (RequirePlace), and, as the runs of a row have one
+/// configuration, when its own is the row's most frequent one. `step` of a row is the end of a
+/// task, at most 1 000 000 a task. Of each row only the runs of the newest revision among them
+/// count.
+ExperimentSummary Summarize(const std::filesystem::path& experiment);
 
 /// fidelity, task, algorithm, step, n_seeds, mean, std, stderr, iqm, ci_low, ci_high as CSV: std
 /// with divisor n, 95 % bootstrap interval of the mean. A row without values is left out.

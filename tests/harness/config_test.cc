@@ -324,6 +324,62 @@ TEST(ParseRunConfig, RefusesMissingKeys) {
   }
 }
 
+// ---- Formats
+
+/// A program that got the switch timelimit in format 2 and the number gamma of ppo in format 3.
+const std::vector<AddedKey> kAdded = {{"switches", "timelimit", "released", 2},
+                                      {"ppo", "gamma", "0.5", 3}};
+
+/// The configuration of Hopper-v2 and ppo without some keys.
+std::string Without(std::initializer_list<std::string> keys) {
+  std::string text = ToToml(ResolveRun(Request("ppo", "Hopper-v2")));
+  for (const std::string& key : keys) {
+    const std::size_t begin = text.find("\n" + key + " = ") + 1, end = text.find('\n', begin);
+    text.erase(begin, end + 1 - begin);
+  }
+  return text;
+}
+
+TEST(Formats, AKeyThatWasAddedLaterHasItsHistoricalValue) {
+  const RunConfig config = ParseRunConfig(Without({"timelimit", "gamma"}), "x.toml", kAdded);
+  EXPECT_EQ(config.switches.timelimit, Fidelity::kReleased);  // not today's, which is paper
+  EXPECT_EQ(config.hyper.Real("gamma"), 0.5);
+  // The same as the layer of a new run.
+  RunRequest request;
+  request.config = ConfigText{"x.toml", Without({"timelimit", "gamma"})};
+  EXPECT_EQ(ToToml(ResolveRun(request, kAdded), kAdded), ToToml(config, kAdded));
+}
+
+TEST(Formats, AKeyThatTheFormatHasMustBeThere) {
+  const std::string second = "format = 2\n" + Without({"gamma"});
+  EXPECT_EQ(ParseRunConfig(second, "x.toml", kAdded).hyper.Real("gamma"), 0.5);
+  for (const std::string& text :
+       {"format = 2\n" + Without({"timelimit"}), "format = 3\n" + Without({"gamma"})}) {
+    EXPECT_CONTAINS(Message([&] { ParseRunConfig(text, "x.toml", kAdded); }), "missing key");
+  }
+}
+
+TEST(Formats, AreSaidFromTheSecondOnAndReadBack) {
+  const RunConfig config = ResolveRun(Request("ppo", "Hopper-v2"));
+  EXPECT_TRUE(ToToml(config).starts_with("[run]\n"));
+  const std::string text = ToToml(config, kAdded);
+  EXPECT_EQ(text, "format = 3\n\n" + ToToml(config));
+  EXPECT_EQ(ToToml(ParseRunConfig(text, "x.toml", kAdded), kAdded), text);
+}
+
+TEST(Formats, OfNewerProgramsAreRefused) {
+  for (const char* format : {"2", "0", "-1", "1.5", "\"1\""}) {
+    const std::string text = Concat("format = ", format, "\n", Without({}));
+    EXPECT_CONTAINS(Message([&] { ParseRunConfig(text, "x.toml"); }), "x.toml:1: format");
+  }
+}
+
+TEST(Formats, AnExperimentsFileThatLacksAKeyGetsTodaysValue) {
+  RunRequest request = Request("ppo", "Hopper-v2");
+  request.config = ConfigText{"x.toml", "[run]\nsteps = 7\n"};
+  EXPECT_EQ(ResolveRun(request, kAdded).switches.timelimit, Fidelity::kPaper);
+}
+
 // ---- Methods
 
 TEST(MakeRunAlgorithm, ReadsEveryNumberOfEveryMethod) {

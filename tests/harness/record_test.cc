@@ -102,17 +102,22 @@ TEST(RecordJson, HoldsConfigBuildRevisionAndCostButNoDate) {
   EXPECT_EQ(json.at("cpu_seconds"), 2.5);
   EXPECT_TRUE(json.contains("commit"));
   EXPECT_FALSE(json.contains("start"));
+  EXPECT_EQ(json.at("format"), 1);
 }
 
 TEST(ReadRecord, OfBeforeThereWereRevisionsIsOfTheFirst) {
   TestFolder dir;
-  WriteFileAtomically(dir / "a.json",
-                      R"({"status": "done", "steps": 7, "cpu_seconds": 1.5, "config": ""})");
+  const std::string config = ToToml(FakeConfig());
+  const nlohmann::json old = {
+      {"status", "diverged"}, {"steps", 7}, {"cpu_seconds", 1.5}, {"config", config}};
+  WriteFileAtomically(dir / "a.json", old.dump());
+  for (const char* name : {"a.csv", "b.csv"}) WriteFileAtomically(dir / name, "step,return_20\n");
   EXPECT_EQ(ReadRecord(dir / "a.json").revision, 1);
   EXPECT_EQ(ReadRecord(dir / "a.json").cpu_seconds, 1.5);
   Manifest manifest;
+  manifest.status = RunStatus::kDiverged;
   manifest.revision = 2;
-  WriteFileAtomically(dir / "b.json", RecordJson(ManifestJson(manifest), ""));
+  WriteFileAtomically(dir / "b.json", RecordJson(ManifestJson(manifest), config));
   EXPECT_EQ(ReadRecord(dir / "b.json").revision, 2);
 }
 
