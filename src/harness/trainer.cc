@@ -234,6 +234,10 @@ class Run {
   /// Loads the last checkpoint where there is one. `before` is the manifest of the processes
   /// before.
   void Start(const std::optional<Manifest>& before) {
+    if (before && before->revision != parts_.revision) {
+      throw ConfigError(Concat(dir_.string(), ": this run was begun at revision ", before->revision,
+                               " of the method, this program is revision ", parts_.revision));
+    }
     manifest_.start = before ? before->start : Now();
     manifest_.revision = parts_.revision;
     wall_before_ = before ? before->wall_seconds : 0;

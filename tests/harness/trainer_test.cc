@@ -73,6 +73,19 @@ class Trainer : public testing::Test {
   std::ostringstream progress_;
 };
 
+TEST_F(Trainer, RefusesToGoOnWithARunOfAnotherRevision) {
+  hooks_.stop = [] { return true; };
+  parts_.revision = 1;
+  EXPECT_EQ(Start("run"), RunStatus::kStopped);
+  parts_.revision = 2;
+  EXPECT_EQ(Refused([&] { Resume("run"); }),
+            (dir_ / "run").string() +
+                ": this run was begun at revision 1 of the method, this program is revision 2");
+  EXPECT_EQ(ReadManifest(dir_ / "run")->revision, 1);
+  parts_.revision = 1;
+  EXPECT_EQ(Resume("run"), RunStatus::kDone);
+}
+
 TEST_F(Trainer, LeavesAWholeFolderAndItsRecord) {
   EXPECT_EQ(Start("run"), RunStatus::kDone);
   for (const std::string& file : kPromised) EXPECT_TRUE(fs::exists(dir_ / "run" / file)) << file;
