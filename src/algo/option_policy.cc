@@ -108,8 +108,14 @@ void LogDensity(Fidelity density_log_eps, Vec& logp, Vec& slope) {
     slope.setOnes(logp.size());
     return;
   }
-  slope = logp.array().exp();
-  logp = (slope.array() + Real(kLogEps)).log();
+  slope = logp;
+  logp = (logp.array().exp() + Real(kLogEps)).log();
+  for (Index b = 0; b < slope.size(); ++b) {
+    if (slope(b) <= Real(kLargeLog) || std::isnan(slope(b))) continue;
+    logp(b) = slope(b);
+    slope(b) = Real(kLargeLog);
+  }
+  slope = slope.array().exp();
   slope = slope.array() / (slope.array() + Real(kLogEps));
 }
 

@@ -10,6 +10,8 @@ namespace o2v {
 
 /// Added to p in ln(p + eps): spec 3.3.
 inline constexpr double kLogEps = 1e-5;
+/// ln(e^x + 1e-5) is x from here on, to the last bit; e^x is a float.
+inline constexpr double kLargeLog = 80;
 
 /// M.col(b) = onehot(o_b), (K, B).
 void OneHot(std::span<const int> o, Mat& M);

@@ -21,7 +21,9 @@ enum class Freeze {
   kNone,
 };
 
-/// All switches of spec 8 that the methods read; each acts in one place, named there.
+/// All switches of spec 8. Each acts in one file, two apart: timelimit wherever a method values a
+/// step that the time limit ended (PpoCore, IOPG, OC), density_log_eps wherever one takes the
+/// logarithm of a density or probability (LogDensity, OptionLog, IOPG).
 struct Switches {
   Fidelity timelimit = Fidelity::kPaper;             // bootstrap at truncation | terminal
   double adv_std_eps = 1e-8;                         // added to the advantages' std | 0

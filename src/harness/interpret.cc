@@ -45,6 +45,11 @@ Interpretation Interpret(Algorithm& algorithm, const Normalizer& normalizer, Env
 
   Mat& W_o = embedding->value;
   const Mat kept = W_o;
+  struct Restore {  // also when a query throws
+    Mat& W_o;
+    const Mat& kept;
+    ~Restore() { W_o = kept; }
+  } const restore{W_o, kept};
   MatD J;
   Mat mu, moved, sigma;
   algorithm.MeanJacobian(s, o, J);

@@ -12,6 +12,10 @@ void DrawDropoutMask(double p, Rng& rng, Mat& mask) {
   Check(p >= 0 && p < 1, "dropout: got probability ", p, ", not one in [0, 1)");
   // u < p for u = (first, second) of 16 bits: by the first byte alone unless it equals p's.
   const auto p16 = static_cast<std::uint32_t>(std::lround(p * 0x1p16));
+  if (p16 == 0x10000) {  // 1, to 2^-17
+    mask.setZero();
+    return;
+  }
   const auto first = static_cast<std::uint8_t>(p16 >> 8), second = static_cast<std::uint8_t>(p16);
   const Real keep = static_cast<Real>(1 / (1 - p));
   Real* out = mask.data();

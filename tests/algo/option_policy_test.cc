@@ -139,5 +139,16 @@ TEST(LogDensity, AddsEpsilonInReleased) {
   EXPECT_EQ(slope(1), 0);
 }
 
+TEST(LogDensity, IsTheDensityItselfWhereItsExponentialWouldOverflow) {
+  Vec logp(4), slope;
+  logp << 90, 3000, 79, std::numeric_limits<Real>::quiet_NaN();
+  LogDensity(Fidelity::kReleased, logp, slope);
+  EXPECT_EQ(logp(0), 90);
+  EXPECT_EQ(logp(1), 3000);
+  EXPECT_NEAR(logp(2), 79, 1e-5);
+  for (Index b = 0; b < 3; ++b) EXPECT_EQ(slope(b), 1) << b;
+  EXPECT_TRUE(std::isnan(logp(3)) && std::isnan(slope(3)));  // not hidden
+}
+
 }  // namespace
 }  // namespace o2v

@@ -106,7 +106,7 @@ TEST_F(Divergence, EndsTheCurveWhereItHappened) {
     expected += Decimal(step) + "," + Decimal(Smoothed(episodes, step)) + "\n";
   }
   EXPECT_EQ(ReadFile(dir_ / "run.csv"), expected);
-  const Record record = ReadRecord(dir_ / "run.json");
+  const RecordHead record = ReadRecordHead(dir_ / "run.json");
   EXPECT_EQ(record.status, RunStatus::kDiverged);
   EXPECT_EQ(record.steps, 25'002);
 }

@@ -66,6 +66,25 @@ class Interpreter : public testing::Test {
 // Option 1: (0.1, 1.1); (0.1, 1.15); mu = tanh(0.02 - 0.115) = tanh(-0.095).
 // W_mu W_1 = (0.15, -0.1). An episode has one state with option 0 and six with option 1.
 
+/// Fails when it is asked with a perturbed embedding.
+class Fragile final : public FakeAlgorithm {
+ public:
+  using FakeAlgorithm::FakeAlgorithm;
+  Param W_o{"W_o", 2, 2};
+  Param* Embedding() override { return &W_o; }
+  void MeanJacobian(const Mat&, const std::vector<int>&, MatD& J) override { J.setZero(1, 2); }
+  void ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, Mat& sigma) override {
+    Check((W_o.value.array() == 0).all(), "perturbed");
+    FakeAlgorithm::ActionPolicy(s, o, mu, sigma);
+  }
+};
+
+TEST_F(Interpreter, RestoresTheEmbeddingWhenAQueryFails) {
+  Fragile fragile(env_.Spec(), 1);
+  EXPECT_EQ(Message<Error>([&] { Interpret(fragile, normalizer_, env_, 1, 0.5, 1); }), "perturbed");
+  EXPECT_EQ(fragile.W_o.value, Mat::Zero(2, 2));
+}
+
 TEST_F(Interpreter, AveragesTheDerivativeOverVisitedStates) {
   const Interpretation x = Run(0.5);
   EXPECT_EQ(x.states, 21);

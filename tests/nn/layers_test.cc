@@ -149,6 +149,15 @@ TEST(Dropout, DropsWhereSixteenBitsAreBelowTheProbability) {
   }
 }
 
+TEST(Dropout, DropsEverythingNearOne) {
+  Rng rng(9, "mask");
+  Mat mask(8, 8);
+  for (const double p : {1 - 0x1p-18, 1 - 0x1p-40}) {
+    DrawDropoutMask(p, rng, mask);
+    EXPECT_TRUE((mask.array() == 0).all()) << p;
+  }
+}
+
 TEST(Dropout, EntriesOfAWordAreIndependent) {
   Rng rng(3, "test");
   Mat mask(4, 5000);
