@@ -145,9 +145,10 @@ void Iopg::Visit(StateVisitor& v) {
     v.Matrix(name + "s", worker.s);
     v.Matrix(name + "a", worker.a);
     v.Doubles(name + "r", worker.r);
-    v.Ints(name + "init", worker.init);
+    v.AllBelow(name + "init", worker.init, 2);
+    v.Within(0, worker.r.size());
     v.Int(name + "length", worker.length);
-    v.Int(name + "o_prev", worker.o_prev);
+    v.Below(name + "o_prev", worker.o_prev, K_);
   }
 }
 
@@ -275,7 +276,7 @@ void Iopg::BackwardHistory(std::span<const int> init, Index n) {
   for (Index t = n - 1; t >= 0; --t) {
     const auto pi = h.pi.col(t).array(), beta = h.beta.col(t).array(), m = h.m.col(t).array();
     const auto ratio = (h.log_p.col(t).array() - h.log_c(t)).exp();  // p_t / c_t
-    const double c = std::exp(h.log_c(t));
+    const double c = std::exp(std::min(h.log_c(t), kLargeLog));
     const double kappa =
         -(h.R(t) - h.v(t)) / double(n) * (eps ? c / (c + kLogEps) : 1);  // of ln c_t
     if (paper) {

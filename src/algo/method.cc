@@ -98,7 +98,7 @@ void Method::Visit(StateVisitor& v) {
   for (Param* p : params_) v.Matrix(p->name, p->value);
   adam_->Visit(v);
   for (auto& [name, rng] : streams_) rng.Visit(v, "rng." + name);
-  if (!o_prev_.empty()) v.Ints("o_prev", o_prev_);
+  if (!o_prev_.empty()) v.AllBelow("o_prev", o_prev_, K_);
 }
 
 double Method::Step(int stage) {

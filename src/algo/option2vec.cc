@@ -137,7 +137,7 @@ Option2Vec::Option2Vec(const AlgorithmInput& in)
 void Option2Vec::Visit(StateVisitor& v) {
   Method::Visit(v);
   int frozen = frozen_;
-  v.Int("frozen", frozen);
+  v.Below("frozen", frozen, 2);
   if (frozen && !frozen_) Freeze();
 }
 

@@ -82,9 +82,11 @@ std::unique_ptr<mjModel, MujocoEnv::Delete> MujocoEnv::Load(const std::string& n
   mj_defaultVFS(files.get());
   for (const auto& file : Embedded_models()) {
     const std::string path(file.name);
-    mj_makeEmptyFileVFS(files.get(), path.c_str(), static_cast<int>(file.text.size()));
+    const int failed =
+        mj_makeEmptyFileVFS(files.get(), path.c_str(), static_cast<int>(file.text.size()));
+    Check(failed == 0, "model file ", path, ": ", failed == 1 ? "no room" : "there twice");
     const int i = mj_findFileVFS(files.get(), path.c_str());
-    Check(i >= 0, "model file ", path, ": no room");
+    Check(i >= 0, "model file ", path, ": not found again");
     std::memcpy(files->filedata[i], file.text.data(), file.text.size());
   }
   char error[1000] = "";
@@ -205,6 +207,7 @@ void MujocoEnv::Visit(StateVisitor& v, const std::string& prefix) {
   v.Doubles(prefix + "qvel", data_->qvel, qvel().size());
   v.Doubles(prefix + "qacc_warmstart", data_->qacc_warmstart, qvel().size());
   v.Double(prefix + "gauge", gauge_);
+  v.Within(0, spec_.time_limit);
   v.Int(prefix + "episode_step", steps_);
   const std::span<double> target = Target();
   if (!target.empty()) v.Doubles(prefix + "target", target.data(), target.size());

@@ -4,6 +4,7 @@
 #include <bit>
 #include <charconv>
 #include <cstring>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string_view>
@@ -21,6 +22,7 @@ using RealRowMajor = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic, Eigen::
 
 static_assert(std::endian::native == std::endian::little, "safetensors data is little-endian");
 
+constexpr std::string_view kFormatName = "option2vec-";
 constexpr std::string_view kFormat = "option2vec-1";  // of the whole training state
 constexpr std::string_view kRealType = sizeof(Real) == 4 ? "F32" : "F64";
 constexpr std::size_t kLengthBytes = 8;  // of the header's length; safetensors layout
@@ -41,8 +43,9 @@ std::size_t Width(std::string_view type) { return type == "F32" ? 4 : 8; }
 /// A parsed file. The tensors point into `text`.
 struct File {
   std::string path, text;
-  Metadata metadata;
+  Metadata metadata;  // of one of ours
   std::map<std::string, Tensor> tensors;
+  bool ours = false;  // written by SaveCheckpoint
 
   template <typename... Parts>
   void Require(bool ok, const Parts&... parts) const {
@@ -115,8 +118,22 @@ void RequireNoGaps(const File& file, std::string_view data) {
                " bytes of data belong to no tensor");
 }
 
+/// A JSON text without a name that stands twice in an object.
+json ParseJson(std::string_view text) {
+  std::vector<std::set<std::string>> open;  // names of the objects around
+  return json::parse(text, [&](int, json::parse_event_t event, json& x) {
+    if (event == json::parse_event_t::object_start) open.emplace_back();
+    if (event == json::parse_event_t::object_end) open.pop_back();
+    if (event == json::parse_event_t::key) {
+      const auto name = x.get<std::string>();
+      Check(open.back().insert(name).second, "bad header: ", name, " stands there twice");
+    }
+    return true;
+  });
+}
+
 File ParseFile(const std::filesystem::path& path) {
-  File file{path.string(), ReadFile(path), {}, {}};
+  File file{path.string(), ReadFile(path), {}, {}, false};
   const std::string_view text = file.text;
   std::uint64_t length = 0;
   file.Require(text.size() >= kLengthBytes, "not a checkpoint: ", text.size(), " bytes");
@@ -126,7 +143,7 @@ File ParseFile(const std::filesystem::path& path) {
   const std::string_view header = text.substr(kLengthBytes, length);
   const std::string_view data = text.substr(kLengthBytes + length);
   try {
-    const json entries = json::parse(header);
+    const json entries = ParseJson(header);
     file.Require(entries.is_object(), "the header is not a JSON object");
     for (const auto& [name, entry] : entries.items()) {
       if (name == kMetadataKey) {
@@ -139,9 +156,16 @@ File ParseFile(const std::filesystem::path& path) {
     file.Require(false, "not a checkpoint: bad header: ", e.what());
   }
   RequireNoGaps(file, data);
-  if (const auto it = file.metadata.find("checksum"); it != file.metadata.end()) {
+  const std::string format = file.metadata["format"];
+  file.ours = format == kFormat;
+  if (file.ours) {
     const std::string found = Checksum(file.metadata, file.tensors);
-    file.Require(found == it->second, "damaged: checksum ", found, ", not ", it->second);
+    const std::string said = file.metadata["checksum"];
+    file.Require(found == said, "damaged: checksum ", found, ", not '", said, "'");
+  } else {
+    file.Require(!format.starts_with(kFormatName), "format ", format, "; this program reads ",
+                 kFormat);
+    file.metadata.clear();  // means something else elsewhere
   }
   return file;
 }
@@ -227,19 +251,30 @@ class Loader final : public StateVisitor {
 
   void Matrix(std::string_view name, Mat& x) override {
     const Tensor& t = Find(name, kRealType, x.rows(), x.cols());
-    if (!copy_) return;
     RealRowMajor rows(x.rows(), x.cols());
     Copy(t, rows.data());
-    x = rows;
+    RequireFinite(name, rows.allFinite());
+    if (copy_) x = rows;
   }
   void Doubles(std::string_view name, double* x, std::size_t n) override {
     const Tensor& t = Find(name, "F64", static_cast<Index>(n), 1);
-    if (copy_) Copy(t, x);
+    VecD values(static_cast<Index>(n));
+    Copy(t, values.data());
+    RequireFinite(name, values.allFinite());
+    if (copy_) std::copy(values.begin(), values.end(), x);
   }
   void Ints(std::string_view name, std::int64_t* x, std::size_t n) override {
     const Tensor& t = Find(name, "I64", static_cast<Index>(n), 1);
-    if (copy_) Copy(t, x);
+    std::vector<std::int64_t> values(n);
+    Copy(t, values.data());
+    for (const std::int64_t value : values) {
+      file_.Require(low_ <= value && value <= high_, names_.InFile(name), ": ", value,
+                    " is not in [", low_, ", ", high_, "]");
+    }
+    Within(kLowest, kHighest);
+    if (copy_) std::copy(values.begin(), values.end(), x);
   }
+  void Within(std::int64_t low, std::int64_t high) override { low_ = low, high_ = high; }
 
   void RequireAllSeen() const {
     for (const auto& [name, t] : file_.tensors) {
@@ -248,6 +283,12 @@ class Loader final : public StateVisitor {
   }
 
  private:
+  static constexpr std::int64_t kLowest = std::numeric_limits<std::int64_t>::min(),
+                                kHighest = std::numeric_limits<std::int64_t>::max();
+
+  void RequireFinite(std::string_view name, bool finite) const {
+    file_.Require(finite, names_.InFile(name), " has a value that is not finite");
+  }
   const Tensor& Find(std::string_view name, std::string_view type, Index rows, Index cols) {
     const std::string key = names_.InFile(name);
     const auto it = file_.tensors.find(key);
@@ -265,6 +306,7 @@ class Loader final : public StateVisitor {
   const File& file_;
   const Names& names_;
   bool copy_;
+  std::int64_t low_ = kLowest, high_ = kHighest;  // of the next whole numbers
   std::set<std::string, std::less<>> seen_;
 };
 
@@ -307,9 +349,8 @@ void SaveCheckpoint(const std::filesystem::path& path, Metadata metadata, Algori
 Metadata LoadCheckpoint(const std::filesystem::path& path, Algorithm& algorithm,
                         const StateWalk& walk) {
   File file = ParseFile(path);
-  const auto format = file.metadata.extract("format");
-  file.Require(format && format.mapped() == kFormat && file.metadata.erase("checksum") == 1,
-               "not a checkpoint of a run: format or checksum missing");
+  file.Require(file.ours, "not a checkpoint of a run: its format is not ", kFormat);
+  for (const char* added : {"format", "checksum"}) file.metadata.erase(added);
   const Names names(algorithm);
   Loader check(file, names, /*copy=*/false);
   walk(check);

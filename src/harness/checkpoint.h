@@ -5,8 +5,8 @@
 //   <parameter>       F32, named and shaped as Algorithm::Params(), row-major, vectors (n, 1)
 //   normalizer.mean   F64 (S, 1);  normalizer.var F64 (S, 1);  normalizer.count F64 (1, 1)
 //   training.<name>   all else that a resumed run needs: F32 matrices, F64 and I64 (n, 1)
-//   __metadata__      strings; "checksum" covers the metadata, every tensor's name, type, shape and
-//   data
+//   __metadata__      strings; "format" tells our files from others; "checksum" covers the metadata
+//                     and every tensor's name, type, shape and data
 //
 // A file is checked whole before anything is changed. Every failure is an Error that names the file
 // and what is wrong with it.
@@ -32,16 +32,17 @@ void SaveCheckpoint(const std::filesystem::path& path, Metadata metadata, Algori
                     const StateWalk& walk, const std::function<void()>& before_rename = {});
 
 /// Restores all state of a run from a file of SaveCheckpoint, which must hold exactly the tensors
-/// that `walk` shows. Returns the metadata that SaveCheckpoint was given.
+/// that `walk` shows, finite and within the bounds that the walk states. Returns the metadata that
+/// SaveCheckpoint was given.
 Metadata LoadCheckpoint(const std::filesystem::path& path, Algorithm& algorithm,
                         const StateWalk& walk);
 
-/// The metadata of a file; empty for one from elsewhere that has none.
+/// The metadata of a file; empty for one from elsewhere, whatever it says.
 Metadata ReadMetadata(const std::filesystem::path& path);
 /// Environment steps of the run that wrote it; nothing where the metadata does not say.
 std::optional<std::int64_t> TotalSteps(const Metadata& metadata);
 
-/// Sets parameters and normaliser only. Also takes files from elsewhere: no metadata, no training
+/// Sets parameters and normaliser only. Also takes files from elsewhere: any metadata, no training
 /// state, no normalizer.count, F64 numbers. Every parameter must be there with its shape and finite
 /// values; a name that is neither a parameter, nor of the normaliser, nor training state is
 /// refused.

@@ -67,7 +67,7 @@ void CsvLog::Flush() {
 }
 
 void CsvLog::Visit(StateVisitor& v, const std::string& prefix) {
-  v.Int(prefix + ".bytes", bytes_);
+  v.Count(prefix + ".bytes", bytes_);
   v.Int(prefix + ".hash", hash_);
 }
 
@@ -133,8 +133,8 @@ void RunLogs::Flush() {
 void RunLogs::Visit(StateVisitor& v) {
   episodes_.Visit(v, "episodes");
   updates_.Visit(v, "updates");
-  v.Int("updates.row_step", row_step_);
-  v.Int("updates.step", step_);
+  v.Count("updates.row_step", row_step_);
+  v.Count("updates.step", step_);
   v.Doubles("updates.sums", sums_);
   v.Doubles("updates.ns", ns_);
   for (CsvLog& log : evals_) log.Visit(v, "evals");

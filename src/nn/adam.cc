@@ -76,7 +76,7 @@ void Adam::Visit(StateVisitor& visitor) {
     visitor.Matrix("adam.m." + params_[i]->name, m_[i]);
     visitor.Matrix("adam.v." + params_[i]->name, v_[i]);
   }
-  visitor.Ints("adam.t", t_.data(), t_.size());
+  visitor.Counts("adam.t", t_.data(), t_.size());
 }
 
 }  // namespace o2v

@@ -38,6 +38,8 @@ void Normalizer::Visit(StateVisitor& v) {
   v.Doubles("normalizer.mean", mean_);
   v.Doubles("normalizer.var", var_);
   v.Double("normalizer.count", count_);
+  Check((var_.array() >= 0).all(), "normalizer.var has a negative entry");
+  Check(count_ >= 0, "normalizer.count is ", count_);
   inv_std_ = (var_.array() + 1e-8).sqrt().inverse();
 }
 

@@ -102,10 +102,10 @@ void VecEnv::Step(const Mat& a, Transition& out, std::vector<Episode>& episodes)
 
 void VecEnv::Visit(StateVisitor& v) {
   normalizer_.Visit(v);
-  v.Int("total_steps", total_steps_);
+  v.Count("total_steps", total_steps_);
   v.Matrix("states", s_);
   std::vector<int> init(init_.begin(), init_.end());
-  v.Ints("init_flags", init);
+  v.AllBelow("init_flags", init, 2);
   std::copy(init.begin(), init.end(), init_.begin());
   v.Doubles("episode_returns", returns_);
   v.Ints("episode_lengths", lengths_);

@@ -185,6 +185,107 @@ TEST_F(Checkpoint, ChecksumCoversMetadataToo) {
   EXPECT_THROW(ReadMetadata(path_), Error);
 }
 
+/// A state with options and a counter.
+struct Indexed {
+  State state{1};
+  std::vector<int> o_prev = {2, 0};
+  std::int64_t steps = 5;
+  StateWalk Walk() {
+    return [this](StateVisitor& v) {
+      state.Walk()(v);
+      v.AllBelow("options", o_prev, 3);
+      v.Count("counter", steps);
+    };
+  }
+};
+
+TEST_F(Checkpoint, RefusesIndicesAndCountersOutOfRangeWithoutATrace) {
+  const auto refused = [&](std::vector<int> o_prev, std::int64_t steps) -> std::string {
+    Indexed saved, loaded;
+    saved.o_prev = std::move(o_prev);
+    saved.steps = steps;
+    SaveCheckpoint(path_, {}, saved.state.algorithm, [&](StateVisitor& v) {
+      saved.state.Walk()(v);
+      v.Ints("options", saved.o_prev);
+      v.Int("counter", saved.steps);
+    });
+    loaded.state.algorithm.Params()[0]->value.setConstant(77);
+    try {
+      LoadCheckpoint(path_, loaded.state.algorithm, loaded.Walk());
+    } catch (const Error& e) {
+      EXPECT_EQ(loaded.state.algorithm.Params()[0]->value(0, 0), 77);
+      return std::string(e.what()).substr(path_.string().size() + 2);
+    }
+    return "";
+  };
+  EXPECT_EQ(refused({2, 0}, 5), "");
+  EXPECT_EQ(refused({2, 3}, 5), "training.options: 3 is not in [0, 2]");
+  EXPECT_EQ(refused({2, 100000000}, 5), "training.options: 100000000 is not in [0, 2]");
+  EXPECT_EQ(refused({2, 0}, -1), "training.counter: -1 is not in [0, 9007199254740992]");
+}
+
+TEST_F(Checkpoint, RefusesWholeNumbersThatDoNotFitAnInt) {
+  Indexed saved;
+  std::int64_t wide[2] = {std::int64_t{1} << 32, 0};
+  SaveCheckpoint(path_, {}, saved.state.algorithm, [&](StateVisitor& v) {
+    saved.state.Walk()(v);
+    v.Ints("options", wide, 2);
+    v.Int("counter", saved.steps);
+  });
+  EXPECT_THROW(LoadCheckpoint(path_, saved.state.algorithm,
+                              [&](StateVisitor& v) {
+                                saved.state.Walk()(v);
+                                v.Ints("options", saved.o_prev);
+                                v.Int("counter", saved.steps);
+                              }),
+               Error);
+}
+
+TEST_F(Checkpoint, WithANumberThatIsNotFiniteCannotBeResumed) {
+  State saved(1), loaded(1);
+  double x[2] = {1, std::numeric_limits<double>::infinity()};
+  const auto walk = [&](State& state) -> StateWalk {
+    return [&](StateVisitor& v) {
+      state.Walk()(v);
+      v.Doubles("more", x, 2);
+    };
+  };
+  SaveCheckpoint(path_, {}, saved.algorithm, walk(saved));
+  EXPECT_THROW(LoadCheckpoint(path_, loaded.algorithm, walk(loaded)), Error);
+  x[1] = 2;
+  saved.algorithm.Params()[0]->value(0, 0) = std::numeric_limits<Real>::quiet_NaN();
+  SaveCheckpoint(path_, {}, saved.algorithm, walk(saved));
+  EXPECT_THROW(LoadCheckpoint(path_, loaded.algorithm, walk(loaded)), Error);
+}
+
+TEST_F(Checkpoint, WithANameThatStandsTwiceIsRefused) {
+  const auto [header, data] = Foreign();
+  std::string text = header.dump();
+  text.insert(1, R"("actor.b": {"dtype": "F32", "shape": [1, 1], "data_offsets": [0, 4]},)");
+  text.append((8 - text.size() % 8) % 8, ' ');
+  const std::uint64_t length = text.size();
+  Write(std::string(reinterpret_cast<const char*>(&length), 8) + text + data);
+  EXPECT_EQ(RefusedPolicy(), "bad header: actor.b stands there twice");
+}
+
+TEST_F(Checkpoint, FromElsewhereMayHaveMetadataOfItsOwn) {
+  auto [header, data] = Foreign();
+  header["__metadata__"] = {{"format", "pt"}, {"checksum", "sha256:1"}, {"config", "{}"}};
+  Write(Join(header, data));
+  State state(2);
+  Normalizer normalizer(2);
+  LoadPolicy(path_, state.algorithm, normalizer);
+  EXPECT_EQ(state.algorithm.Params()[0]->value(0, 1), Real(-0.25));
+  EXPECT_TRUE(ReadMetadata(path_).empty());
+}
+
+TEST_F(Checkpoint, OfANewerFormatIsRefused) {
+  auto [header, data] = Foreign();
+  header["__metadata__"] = {{"format", "option2vec-2"}};
+  Write(Join(header, data));
+  EXPECT_EQ(RefusedPolicy(), "format option2vec-2; this program reads option2vec-1");
+}
+
 TEST_F(Checkpoint, OfARunGivesItsPolicy) {
   State saved(1), loaded(2);
   Save(saved);

@@ -95,7 +95,7 @@ TEST(DamagedCheckpoint, GivesTheSamePolicyOrNone) {
   ForEachDamage(text, [&](const std::string& damaged, const std::string& what) {
     Write(dir / "x", damaged);
     if (Refuses([&] { LoadPolicy(dir / "x", other.algorithm, normalizer); })) return;
-    ++accepted;  // the key "checksum" itself was hit: the values are whole
+    ++accepted;  // the key or value "format" was hit: a file from elsewhere; the values are whole
     EXPECT_EQ(other.algorithm.Params()[0]->value, good.algorithm.Params()[0]->value) << what;
     EXPECT_EQ(other.algorithm.Params()[1]->value, good.algorithm.Params()[1]->value) << what;
     EXPECT_EQ(normalizer.mean(), good.env.normalizer().mean()) << what;
