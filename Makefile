@@ -8,7 +8,7 @@ PRESET := $(if $(filter 1,$(SAN)),asan,release)
 O2V    := build/$(PRESET)/option2vec
 COMPILE = cmake --preset $(PRESET) > /dev/null && cmake --build --preset $(PRESET)
 
-.PHONY: help deps build test clean gradcheck parity theory oracles bench reproduce lint lint-tidy format golden report plots
+.PHONY: help deps build test clean gradcheck parity theory oracles bench reproduce lint lint-tidy format golden report plots torture fuzz
 
 help:  ## lists the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -88,3 +88,22 @@ golden: deps  ## rewrites the golden files; review the difference
 	@$(COMPILE) --target test64_golden test_harness
 	@O2V_REWRITE_GOLDEN=1 build/$(PRESET)/tests/test64_golden
 	@O2V_REWRITE_GOLDEN=1 build/$(PRESET)/tests/test_harness --gtest_filter=ParamTable.IsTheOneOnRecord
+
+TORTURE ?=
+torture: deps  ## a seeded campaign of kills, full disks, limits, signals, races (TORTURE="--scale 0.1")
+	@$(COMPILE) --target option2vec
+	@$(PYTHON) tests/torture/torture.py --program $(O2V) $(TORTURE)
+
+# libFuzzer takes what it finds new into a folder of build/; the committed corpus stays small.
+RUNS    ?= 10000000
+SECONDS ?= 600
+TARGETS ?= checkpoint csv toml record jobs
+fuzz: deps  ## libFuzzer on what is read from files, with clang (RUNS= SECONDS= a target, TARGETS=)
+	@command -v clang++ > /dev/null || { echo "make fuzz needs clang and libclang-rt-dev"; exit 1; }
+	@cmake --preset fuzz > /dev/null && cmake --build --preset fuzz --target $(TARGETS:%=fuzz_%)
+	@for target in $(TARGETS); do \
+	    mkdir -p build/fuzz/corpus/$$target && echo "$$target" && \
+	    build/fuzz/tests/fuzz_$$target -runs=$(RUNS) -max_total_time=$(SECONDS) -timeout=10 -max_len=4096 \
+	        -artifact_prefix=build/fuzz/$$target- -print_final_stats=1 \
+	        build/fuzz/corpus/$$target tests/fuzz/corpus/$$target || exit; \
+	done

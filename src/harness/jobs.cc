@@ -16,8 +16,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The word as a POSIX shell reads it back.
+/// The word as a POSIX shell reads it back. Throws ConfigError for a line break in it: a command is
+/// a line.
 std::string Quoted(const std::string& word) {
+  if (word.find('\n') != std::string::npos) {
+    throw ConfigError(Concat("'", word, "': a line break cannot stand in a line of jobs"));
+  }
   constexpr std::string_view kPlain =
       "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./,:=+@%";
   if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;

@@ -150,6 +150,18 @@ TEST_F(Jobs, QuoteWordsForTheShell) {
   EXPECT_EQ(ListJobs(query)[0].command.substr(0, 20), "'/a b/it'\\''s' train");
 }
 
+TEST_F(Jobs, RefuseALineBreakInAName) {
+  JobQuery query = Query();
+  query.results = "a\nb";
+  try {
+    ListJobs(query);
+    ADD_FAILURE();
+  } catch (const ConfigError& e) {
+    EXPECT_NE(std::string(e.what()).find("a line break cannot stand in a line"), std::string::npos)
+        << e.what();
+  }
+}
+
 TEST_F(Jobs, ListsOfTheQueryReplaceTheExperiments) {
   JobQuery query = Query();
   query.tasks = {"Hopper-v2", "Ant-v2", "Swimmer-v2"};

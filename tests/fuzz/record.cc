@@ -1,0 +1,15 @@
+// The JSON half of a run's record, and the configuration in it.
+
+#include "harness/record.h"
+#include "fuzz/target.h"
+#include "harness/config.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace o2v;
+  static MemoryFile file;
+  Accepts([&] {
+    const Record record = ReadRecord(file.Holding(Bytes(data, size)));
+    ParseRunConfig(record.config, "record");
+  });
+  return 0;
+}
