@@ -245,6 +245,7 @@ TEST(ResolveRun, RefusesMistypedValues) {
 TEST(ResolveRun, RefusesTomlThatDoesNotParseWithItsLine) {
   EXPECT_CONTAINS(MessageAbout("[run]\nsteps = \n"), "x.toml:2");
   EXPECT_CONTAINS(MessageAbout("[run]\nsteps = 1\nsteps = 2\n"), "x.toml:3");
+  EXPECT_CONTAINS(MessageAbout("[run]\n[# run]\n"), "x.toml:2");
 }
 
 TEST(ResolveRun, RefusesBadAssignments) {

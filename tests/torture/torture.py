@@ -86,14 +86,9 @@ class Campaign:
     def finish(self, run, folder):
         """Goes on with a run to its end, and compares."""
         ended = self.end(self.start(run, folder))
-        if ended.code != 0 and not self.done(folder):
+        if not finished(ended):
             raise Failure(f"cannot be resumed: exit {ended.code}: {ended.error.strip()}")
         self.compare(run, folder)
-
-    @staticmethod
-    def done(folder):
-        """Whether the record, which is written last but one, is there."""
-        return folder.with_name(folder.name + ".json").exists()
 
     def compare(self, run, folder):
         whole, _ = self.whole[run]
@@ -109,6 +104,11 @@ def complains(ended):
     return ended.code == 1 and "option2vec: " in ended.error
 
 
+def finished(ended):
+    """Whether the run is done: by this process, or by one that was killed on its way out."""
+    return ended.code == 0 or (ended.code == 2 and "this run is done" in ended.error)
+
+
 def kill(campaign, run, folder, rng):
     """SIGKILL at random moments, several in one run."""
     struck = 0
@@ -121,7 +121,7 @@ def kill(campaign, run, folder, rng):
             except subprocess.TimeoutExpired:
                 process.kill()
             ended = campaign.end(process)
-            if ended.code == 0:
+            if finished(ended):
                 break
             if ended.code != -signal.SIGKILL:
                 raise Failure(f"exit {ended.code}: {ended.error.strip()}")
@@ -221,9 +221,9 @@ def race(campaign, run, folder, rng):
     place = folder / "run"
     processes = [campaign.start(run, place) for _ in range(STARTS)]
     ends = [campaign.end(process) for process in processes]
-    refused = ["another process trains in this folder", "this run is done"]
     for ended in ends:
-        if ended.code != 0 and not (ended.code == 2 and any(r in ended.error for r in refused)):
+        refused = ended.code == 2 and "another process trains in this folder" in ended.error
+        if not finished(ended) and not refused:
             raise Failure(f"exit {ended.code}: {ended.error.strip()}")
     if all(ended.code != 0 for ended in ends):
         raise Failure("nobody trains")
