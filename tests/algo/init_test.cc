@@ -57,6 +57,39 @@ TEST(Init, HalfOfThePreviousOptionsAreStopped) {
   }
 }
 
+TEST(Init, HeadsAreOrthogonalWithTheirGain) {
+  // Spec 2.1, 2.6: rows (or columns, where there are fewer) have the length of the gain, 1e-3 but
+  // for option logits and critic of Option2Vec, and are orthogonal.
+  for (const AlgorithmEntry& method : AlgorithmRegistry()) {
+    for (const Fidelity fidelity : kFidelities) {
+      const auto algorithm = MakeRunAlgorithm(SmallConfig(method.id, fidelity), Sizes(5, 3));
+      int heads = 0;
+      for (const Param* p : algorithm->Params()) {
+        const std::string& name = p->name;
+        const bool o2v = method.id == "option2vec";
+        const bool small = o2v ? name == "action.mu.W" || name == "action.sigma.W"
+                               : name.ends_with(".head.W") || name == "critic.v.W" ||
+                                     name == "critic.q.W" || name == "critic.u.W";
+        const bool unit = o2v ? name == "logits.W" || name == "critic.q.W"
+                              : name.find(".body.") != std::string::npos && name.ends_with(".W");
+        const bool counted_only = method.id == "dac_onestep" && name == "critic.u.W";  // zeros
+        if ((!small && !unit) || counted_only) continue;
+        ++heads;
+        const MatD W = p->value.cast<double>() / (small ? 1e-3 : 1.0);
+        const MatD gram = W.rows() <= W.cols() ? MatD(W * W.transpose()) : MatD(W.transpose() * W);
+        EXPECT_TRUE(gram.isIdentity(1e-4)) << method.id << ", " << name << "\n" << gram;
+      }
+      const int K = algorithm->NumOptions();
+      const int nets = method.id == "ppo" ? 2 : method.id == "dac_onestep" ? 2 + K : 2 + 2 * K;
+      if (method.id == "option2vec") {
+        EXPECT_EQ(heads, 4);
+      } else {  // two layers and a head each, and a head that counts only
+        EXPECT_GE(heads, 3 * nets) << method.id;
+      }
+    }
+  }
+}
+
 TEST(Init, DependsOnTheSeed) {
   for (const AlgorithmEntry& method : AlgorithmRegistry()) {
     RunConfig config = SmallConfig(method.id, Fidelity::kPaper);

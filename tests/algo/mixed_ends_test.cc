@@ -255,6 +255,12 @@ class MixedEnds {
       const VecD h = (w_.at("ynet.0.W") * s + w_.at("ynet.0.b")).cwiseMax(0);
       return (w_.at("ynet.1.W") * h + w_.at("ynet.1.b")).cwiseMax(0).array() + 1e-5;
     }
+    if (Is("dac_onestep") && !Released(sw_.onestep_index)) {  // of the state and o', 0 at first
+      VecD x = VecD::Zero(kS + K_);
+      x.head(kS) = s;
+      if (!init) x(kS + o_prev) = 1;
+      return Softmax(Net("", "policy.body", "policy.head", x));
+    }
     Mat P;
     own_->OptionPolicy(s.cast<Real>(), {o_prev}, {char(init)}, P);
     VecD p = P.col(0).cast<double>();

@@ -23,29 +23,42 @@ class Weights final : public StateVisitor {
   std::vector<Mat> online, target;
 };
 
-TEST(OptionCritic, CopiesItsTargetAtMultiplesOfStepsAWorker) {
-  // Rollouts of 5 steps a worker, a copy after steps 7, 14, ... of a worker: it takes the weights
-  // that the rollout runs with.
-  const int every = 7, T = 5;
-  const RunConfig config =
-      SmallConfig("oc", Fidelity::kPaper, {"rollout=5", "target_every=7", "workers=3"});
+/// Iterations of T steps, numbered from 1, at whose end the target has new weights.
+std::vector<int> Copies(int workers, int every, int T, int iterations) {
+  const RunConfig config = SmallConfig(
+      "oc", Fidelity::kPaper,
+      {Concat("rollout=", T), Concat("target_every=", every), Concat("workers=", workers)});
   VecEnv env = PointTask(config.workers, /*time_limit=*/9);
   const auto algorithm = MakeRunAlgorithm(config, env.Spec());
-  std::vector<Mat> expected = Weights(*algorithm).online;
-  int copies = 0, kept = 0;
-  for (int step = 0; step < 14 * T; step += T) {
+  std::vector<Mat> target = Weights(*algorithm).online;
+  std::vector<int> copies;
+  for (int iteration = 1; iteration <= iterations; ++iteration) {
     const std::vector<Mat> acting = Weights(*algorithm).online;
-    const bool copy = (step + T) / every > step / every;
-    if (copy) expected = acting;
     Iterate(*algorithm, env);
     const Weights now(*algorithm);
-    ASSERT_EQ(now.target.size(), now.online.size());
-    EXPECT_EQ(now.target, expected) << "after step " << step + T;
     EXPECT_NE(now.online, acting);
-    (copy ? copies : kept) += 1;
+    if (now.target != target) {
+      EXPECT_EQ(now.target, acting) << "a copy takes the weights that the rollout runs with";
+      copies.push_back(iteration);
+    }
+    target = now.target;
   }
-  EXPECT_EQ(copies, 10);
-  EXPECT_EQ(kept, 4);
+  return copies;
+}
+
+TEST(OptionCritic, CopiesItsTargetAtMultiplesOfStepsAWorker) {
+  using Iterations = std::vector<int>;
+  // Step by step, whatever divisors the number of workers and the interval share. A copy after the
+  // first iteration cannot be seen: the target starts with the weights of that rollout.
+  EXPECT_EQ(Copies(/*workers=*/4, /*every=*/6, /*T=*/1, 20), (Iterations{6, 12, 18}));
+  EXPECT_EQ(Copies(6, 4, 1, 13), (Iterations{4, 8, 12}));
+  EXPECT_EQ(Copies(2, 4, 1, 13), (Iterations{4, 8, 12}));
+  EXPECT_EQ(Copies(4, 8, 1, 17), (Iterations{8, 16}));
+  EXPECT_EQ(Copies(3, 7, 1, 15), (Iterations{7, 14}));
+  // Steps 6, 12, ... of a worker, 5 an iteration: none in 1..5, 31..35 and 61..65.
+  EXPECT_EQ(Copies(4, 6, 5, 13), (Iterations{2, 3, 4, 5, 6, 8, 9, 10, 11, 12}));
+  // Steps 10, 20, ...: the last of every other iteration.
+  EXPECT_EQ(Copies(5, 10, 5, 6), (Iterations{2, 4, 6}));
 }
 
 /// The value loss on a batch of ours after `value` was written into the online network's `tensor`.

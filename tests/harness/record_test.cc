@@ -45,14 +45,13 @@ TEST(RecordCsv, CountsAnUpdateOnAGridStepToItAndOneBesideItToTheNext) {
   // Up to 10 000: 9999 steps with option 0, in 99 executions, and the one step of the update that
   // ends there, with option 1. Up to 20 000: one step of option 1, 9999 of option 0 in 3
   // executions. Up to 30 000: 10 000 steps of option 1 in 20.
-  const CsvTable updates{
-      "updates.csv",
-      {"step", "usage_0", "usage_1", "duration_0_steps", "duration_1_steps"},
-      {9'999,  1, 0, 101,   0,    //
-       10'000, 0, 1, 0,     1,    //
-       10'001, 0, 1, 0,     1,    //
-       20'000, 1, 0, 3'333, 0,    //
-       30'000, 0, 1, 0,     500}};
+  const CsvTable updates{"updates.csv",
+                         {"step", "usage_0", "usage_1", "duration_0_steps", "duration_1_steps"},
+                         {9'999,  1, 0, 101,   0,  //
+                          10'000, 0, 1, 0,     1,  //
+                          10'001, 0, 1, 0,     1,  //
+                          20'000, 1, 0, 3'333, 0,  //
+                          30'000, 0, 1, 0,     500}};
   EXPECT_EQ(RecordCsv(Rising(300), updates, 30'000),
             "step,return_20,usage_0,usage_1,duration_0_steps,duration_1_steps\n"
             "10000,90.5,0.9999,0.0001,101,1\n"
