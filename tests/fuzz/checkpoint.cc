@@ -69,11 +69,12 @@ std::string Edited(std::string file, std::string_view edits) {
 
 /// Puts in the checksum that the refusal asks for; false when it asks for something else.
 bool MendChecksum(std::string& file, const std::string& refusal) {
-  constexpr std::string_view kFound = "checksum ", kGiven = ", not ";
+  constexpr std::string_view kFound = "checksum ", kGiven = ", not '";
   const std::size_t found = refusal.find(kFound), given = refusal.find(kGiven);
   if (found == std::string::npos || given == std::string::npos) return false;
   const std::size_t start = found + kFound.size();
-  const std::string wrong = refusal.substr(given + kGiven.size());
+  std::string wrong = refusal.substr(given + kGiven.size());
+  wrong.erase(std::min(wrong.find('\''), wrong.size()));
   const std::size_t at = file.find(wrong);
   if (wrong.empty() || at == std::string::npos) return false;
   file.replace(at, wrong.size(), refusal.substr(start, given - start));
