@@ -54,8 +54,8 @@ TEST(RecordCsv, CountsAnUpdateOnAGridStepToItAndOneBesideItToTheNext) {
                           30'000, 0, 1, 0,     500}};
   EXPECT_EQ(RecordCsv(Rising(300), updates, 30'000),
             "step,return_20,usage_0,usage_1,duration_0_steps,duration_1_steps\n"
-            "10000,90.5,0.9999,0.0001,101,1\n"
-            "20000,190.5,0.9999,0.0001,3333,1\n"
+            "10000,90.5,0.9999,1e-04,101,1\n"
+            "20000,190.5,0.9999,1e-04,3333,1\n"
             "30000,290.5,0,1,,500\n");
 }
 
