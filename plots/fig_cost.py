@@ -44,7 +44,7 @@ def draw(results: Path, experiments: Sequence[str] | None = None) -> list[Drawin
     legend_above(figure, (), *parts, (Line2D([], [], color=INK, linestyle="none", marker="|",
                                              markersize=10, markeredgewidth=1.6), "bound"))
     return [Drawing("cost", "CPU cost of an environment step by part; the bound is what no "
-                    "implementation avoids (README, Checks).", figure)]
+                    "implementation avoids (docs/performance.md).", figure)]
 
 
 if __name__ == "__main__":
