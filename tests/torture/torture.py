@@ -288,26 +288,25 @@ def main():
         print("disk: skipped, only root can mount a small disk")
         cases = [case for case in cases if case[0] != "disk"]
 
-    results = collections.defaultdict(list)
+    row = "{:<9} {:>7} {:>7} {:>11} {:>16} {:>9}"
+    repeat = f"{sys.argv[0]} --seed {options.seed} --scale {options.scale:g}"
+    failures = []
     with tempfile.TemporaryDirectory(prefix="o2v-torture-") as folder, \
             concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         campaign = Campaign(os.path.abspath(options.program), pathlib.Path(folder), options.seed)
         list(pool.map(campaign.undisturbed, sorted({run for _, _, run in cases})))
-        for (kind, number, _), result in zip(
-                cases, pool.map(lambda case: attempt(campaign, *case), cases)):
-            results[kind].append((number, *result))
-
-    row = "{:<9} {:>7} {:>7} {:>11} {:>16} {:>9}"
-    print(row.format("kind", "faults", "cases", "same bytes", "refused cleanly", "failures"))
-    repeat = f"{sys.argv[0]} --seed {options.seed} --scale {options.scale:g}"
-    failures = []
-    for kind, ended in results.items():
-        count = collections.Counter(outcome for _, _, outcome, _ in ended)
-        refused = sum(faults - 1 for _, faults, outcome, _ in ended if outcome == "refused")
-        print(row.format(kind, sum(faults for _, faults, _, _ in ended), len(ended),
-                         count["same"] + count["refused"], refused, count["failed"]))
-        failures += [f"{repeat} --only {kind} --case {number}: {message}"
-                     for number, _, outcome, message in ended if outcome == "failed"]
+        print(row.format("kind", "faults", "cases", "same bytes", "refused cleanly", "failures"))
+        for kind, group in itertools.groupby(cases, key=lambda case: case[0]):
+            group = list(group)
+            ended = list(pool.map(lambda case: attempt(campaign, *case), group))
+            count = collections.Counter(outcome for _, outcome, _ in ended)
+            refused = sum(faults - 1 for faults, outcome, _ in ended if outcome == "refused")
+            print(row.format(kind, sum(faults for faults, _, _ in ended), len(ended),
+                             count["same"] + count["refused"], refused, count["failed"]),
+                  flush=True)
+            failures += [f"{repeat} --only {kind} --case {number}: {message}"
+                         for (_, number, _), (_, outcome, message) in zip(group, ended)
+                         if outcome == "failed"]
     for failure in failures:
         print(failure)
     return 1 if failures else 0
