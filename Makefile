@@ -4,6 +4,7 @@ SHELL := /bin/bash
 .DEFAULT_GOAL := help
 
 JOBS   ?= $(shell nproc)
+PHYSICS ?= upstream
 PRESET := $(if $(filter 1,$(SAN)),asan,release)
 O2V    := build/$(PRESET)/option2vec
 COMPILE = cmake --preset $(PRESET) > /dev/null && cmake --build --preset $(PRESET)
@@ -13,8 +14,9 @@ COMPILE = cmake --preset $(PRESET) > /dev/null && cmake --build --preset $(PRESE
 help:  ## lists the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-deps:  ## installs the Debian packages that are missing
+deps:  ## installs what is missing (PHYSICS=debian: Debian's libmujoco, not the faster one of PyPI)
 	@scripts/deps.sh
+	@PHYSICS=$(PHYSICS) scripts/deps_physics.sh
 
 build: deps  ## builds program, tests and benches (SAN=1: under ASan and UBSan)
 	@$(COMPILE)

@@ -7,7 +7,7 @@ packages="
   g++ cmake ninja-build make git
   libeigen3-dev libmujoco-dev libgl-dev libopengl-dev libtomlplusplus-dev libcli11-dev nlohmann-json3-dev
   libgtest-dev libbenchmark-dev
-  python3 python3-numpy python3-scipy python3-matplotlib
+  python3 python3-pip python3-numpy python3-scipy python3-matplotlib
   clang-format clang-tidy
 "
 
