@@ -119,14 +119,14 @@ void RequireNoGaps(const File& file, std::string_view data) {
 }
 
 /// A JSON text without a name that stands twice in an object.
-json ParseJson(std::string_view text) {
+json ParseJson(const File& file, std::string_view text) {
   std::vector<std::set<std::string>> open;  // names of the objects around
   return json::parse(text, [&](int, json::parse_event_t event, json& x) {
     if (event == json::parse_event_t::object_start) open.emplace_back();
     if (event == json::parse_event_t::object_end) open.pop_back();
     if (event == json::parse_event_t::key) {
       const auto name = x.get<std::string>();
-      Check(open.back().insert(name).second, "bad header: ", name, " stands there twice");
+      file.Require(open.back().insert(name).second, "bad header: ", name, " stands there twice");
     }
     return true;
   });
@@ -143,7 +143,7 @@ File ParseFile(const std::filesystem::path& path) {
   const std::string_view header = text.substr(kLengthBytes, length);
   const std::string_view data = text.substr(kLengthBytes + length);
   try {
-    const json entries = ParseJson(header);
+    const json entries = ParseJson(file, header);
     file.Require(entries.is_object(), "the header is not a JSON object");
     for (const auto& [name, entry] : entries.items()) {
       if (name == kMetadataKey) {

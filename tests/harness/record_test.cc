@@ -106,7 +106,10 @@ TEST(RecordJson, HoldsConfigBuildRevisionAndCostButNoDate) {
 
 TEST(ReadRecord, OfBeforeThereWereRevisionsIsOfTheFirst) {
   TestFolder dir;
-  const std::string config = ToToml(FakeConfig());
+  RunRequest request;
+  request.task = "Hopper-v2";
+  request.algorithm = "ppo";
+  const std::string config = ToToml(ResolveRun(request));
   const nlohmann::json old = {
       {"status", "diverged"}, {"steps", 7}, {"cpu_seconds", 1.5}, {"config", config}};
   WriteFileAtomically(dir / "a.json", old.dump());

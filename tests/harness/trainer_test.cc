@@ -74,9 +74,10 @@ class Trainer : public testing::Test {
 };
 
 TEST_F(Trainer, RefusesToGoOnWithARunOfAnotherRevision) {
-  hooks_.stop = [] { return true; };
+  RunHooks hooks;
+  hooks.stop = [] { return true; };
   parts_.revision = 1;
-  EXPECT_EQ(Start("run"), RunStatus::kStopped);
+  EXPECT_EQ(Start("run", hooks), RunStatus::kStopped);
   parts_.revision = 2;
   EXPECT_EQ(Refused([&] { Resume("run"); }),
             (dir_ / "run").string() +
