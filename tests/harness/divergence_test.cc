@@ -153,7 +153,7 @@ TEST_F(Divergence, CountsForTheTaskInWhichItHappenedOnly) {
   WritePairRecord(results, 1, RunStatus::kDiverged, 35'000, "20000,7\n30000,2\n35000,3\n");
   WritePairRecord(results, 2, RunStatus::kDiverged, 20'000, "10000,4\n20000,9\n");
   WritePairRecord(results, 3, RunStatus::kDiverged, 19'998, "10000,6\n19998,1\n");
-  const auto rows = Summarize(results);
+  const auto rows = Summarize(results).rows;
   ASSERT_EQ(rows.size(), 2u);
   EXPECT_EQ(rows[0].step, 20'000);
   EXPECT_EQ(rows[0].values, (std::vector<double>{5, 7, 9}));
