@@ -158,6 +158,7 @@ TEST_F(PolicyCommands, DropoutIsOff) {
       const Outcome outcome = Run(command + " --out out.csv" + set);
       EXPECT_EQ(outcome.code, 0) << outcome.err;
       texts.push_back(ReadFile(dir_ / "out.csv"));
+      std::filesystem::remove(dir_ / "out.csv");  // interpret replaces no file of forward's
     }
     return texts;
   };
