@@ -1,6 +1,6 @@
 #!/bin/sh
-# Fetches MuJoCo's own build of libmujoco 2.2.2, a quarter faster than Debian's and of the same
-# results, into build/physics. Leaves Debian's in use, and says so, when PHYSICS=debian or it cannot
+# Fetches MuJoCo's own build of libmujoco 2.2.2, faster than Debian's and of the same results,
+# into build/physics. Leaves Debian's in use, and says so, when PHYSICS=debian or it cannot
 # be had.
 set -eu
 cd "$(dirname "$0")/.."

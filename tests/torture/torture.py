@@ -106,7 +106,7 @@ def complains(ended):
 
 def finished(ended):
     """Whether the run is done: by this process, or by one that was killed on its way out."""
-    return ended.code == 0 or (ended.code == 2 and "this run is done" in ended.error)
+    return ended.code == 0
 
 
 def kill(campaign, run, folder, rng):
