@@ -12,17 +12,13 @@
 
 #include "base/csv.h"
 #include "base/files.h"
+#include "program.h"
 #include "test_folder.h"
 
 namespace o2v {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct Outcome {
-  int code;
-  std::string out, err;
-};
 
 class Streams : public testing::Test {
  protected:
