@@ -2,9 +2,8 @@
 #include <cmath>
 #include <limits>
 
-#include "algo/method.h"
 #include "algo/option_policy.h"
-#include "algo/ppo_core.h"
+#include "algo/ppo_method.h"
 #include "dist/categorical.h"
 #include "dist/diag_gaussian.h"
 
@@ -20,17 +19,18 @@ namespace {
 ///
 /// u has K + 1 entries, the last one for first states. No entropy term: the authors' weight is
 /// never read. Source: spec 4.4; Levy & Shimkin 2011.
-class AhpPpo final : public Method {
+class AhpPpo final : public PpoMethod {
  public:
   explicit AhpPpo(const AlgorithmInput& in);
 
-  void Collect(VecEnv& env, std::vector<Episode>& episodes) override;
-  const std::vector<Ratio>& Update() override;
   void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
                     Mat& P) override;
   LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) override;
 
  private:
+  void Act(const Mat& s, std::span<const char> init, Index row) override;
+  void Values(const Choices& x, Index row) override;
+
   struct Cache {
     OptionNets::Process options;
     ActionCache action;      // action.logp is ln p
@@ -56,19 +56,14 @@ class AhpPpo final : public Method {
                std::vector<int>& entry) const;
 
   const double clip_;  // c
-  Rng &policy_rng_ = NewStream("policy"), &shuffle_rng_ = NewStream("shuffle");
   OptionNets nets_;
-  PpoRollout rollout_;
   CacheByWidth<Cache> caches_;
 };
 
 AhpPpo::AhpPpo(const AlgorithmInput& in)
-    : Method(in, in.hyper->Int("options", 1)),
-      clip_(in.hyper->Real("ratio_clip")),
-      rollout_(in, /*critics=*/1) {
+    : PpoMethod(in, in.hyper->Int("options", 1)), clip_(in.hyper->Real("ratio_clip")) {
   nets_ = MakeOptionNets(in, OptionNets::CriticHead::kU, init_);
-  const auto reached = [](const std::string& name) { return !name.starts_with("critic.q."); };
-  Assemble(in, nets_.Params(), {reached}, &nets_.policy, &nets_.critic);
+  RegisterNetworks(in, nets_.Params(), {nets_.UsedParams()}, &nets_.policy, &nets_.critic);
   rollout_.batch.stop.assign(std::size_t(rollout_.batch.Size()), 0);
   o_prev_.assign(std::size_t(N_), 0);
 }
@@ -114,45 +109,32 @@ void AhpPpo::AugmentedBackward(const Batch& batch, std::span<const int> x, const
   nets_.master.Backward(batch.s, c.master);
 }
 
-void AhpPpo::Collect(VecEnv& env, std::vector<Episode>& episodes) {
-  nets_.policy.MakeSigma();
+void AhpPpo::Act(const Mat& s, std::span<const char> init, Index row) {
   Batch& batch = rollout_.batch;
   Cache& c = caches_(N_);
-  Vec& logp = c.action.logp;
   c.o.resize(std::size_t(N_));
   c.stop.resize(std::size_t(N_));
-  const auto act = [&](Index row) {
-    const Mat& s = env.States();
-    nets_.Master(s, c.options);
-    nets_.Beta(s, o_prev_, false, c.options.beta);
-    SampleCategorical(c.options.pi, policy_rng_, c.o);  // candidates
-    for (std::size_t i = 0; i < std::size_t(N_); ++i) {
-      const double u = policy_rng_.Uniform();
-      c.stop[i] = env.Init()[i] || u < double(c.options.beta.beta(o_prev_[i], Index(i)));
-      if (!c.stop[i]) c.o[i] = o_prev_[i];
-    }
-    SampleAction(nets_.policy, s, c.o, policy_rng_, rollout_.a, c.action);
-    AddLogAugmented(c.stop, c.o, o_prev_, env.Init(), c.options, logp);
-    LogDensity(switches_.density_log_eps, logp, c.action.slope);
-    batch.low.logp_old.segment(row, N_) = logp;
-    std::copy(c.stop.begin(), c.stop.end(), batch.stop.begin() + row);
-    RecordOptions(row, c.o, env.Init(), batch);
-  };
-  // v = u_{o'} of the states s, from `row` on.
-  const auto value = [&](const ConstMatRef& s, std::span<const int> o_prev,
-                         std::span<const char> init, Index row) {
-    Cache& block = caches_(s.cols());
-    Entries(o_prev, init, block.entry);
-    EntryValues(nets_.critic, s, block.entry, block.value.critic,
-                rollout_.critics[0].v.data() + row);
-  };
-  rollout_.Collect(
-      env, episodes, act,
-      [&](Index row, Index n) {
-        value(batch.s.middleCols(row, n), Rows(batch.o_prev, row, n), Rows(batch.init, row, n),
-              row);
-      },
-      [&](const Mat& s, std::span<const char> init) { value(s, o_prev_, init, batch.Size()); });
+  nets_.Master(s, c.options);
+  nets_.Beta(s, o_prev_, false, c.options.beta);
+  SampleCategorical(c.options.pi, policy_rng_, c.o);  // candidates
+  for (std::size_t i = 0; i < std::size_t(N_); ++i) {
+    const double u = policy_rng_.Uniform();
+    c.stop[i] = init[i] || u < double(c.options.beta.beta(o_prev_[i], Index(i)));
+    if (!c.stop[i]) c.o[i] = o_prev_[i];
+  }
+  SampleAction(nets_.policy, s, c.o, policy_rng_, a_, c.action);
+  AddLogAugmented(c.stop, c.o, o_prev_, init, c.options, c.action.logp);
+  LogDensity(switches_.density_log_eps, c.action.logp, c.action.slope);
+  batch.low.logp_old.segment(row, N_) = c.action.logp;
+  std::copy(c.stop.begin(), c.stop.end(), batch.stop.begin() + row);
+  RecordOptions(row, c.o, init, batch);
+}
+
+/// v = u_{o'}.
+void AhpPpo::Values(const Choices& x, Index row) {
+  Cache& c = caches_(x.s.cols());
+  Entries(x.o_prev, x.init, c.entry);
+  EntryValues(nets_.critic, x.s, c.entry, c.value.critic, rollout_.critics[0].v.data() + row);
 }
 
 LossTerms AhpPpo::Loss(int, const Batch& batch, const FixedDraws*) {
@@ -172,11 +154,6 @@ LossTerms AhpPpo::Loss(int, const Batch& batch, const FixedDraws*) {
   EntryValueLoss(nets_.critic, batch.s, c.entry, batch.low.ret, terms, c.value);
   terms.total = terms.surrogate + terms.value;
   return terms;
-}
-
-const std::vector<Ratio>& AhpPpo::Update() {
-  rollout_.ForEpochs(shuffle_rng_, [&](const Batch& batch) { Learn(0, batch); });
-  return Report();
 }
 
 /// P(o | s, o') = (1 - beta_{o'}) delta_{o o'} + beta_{o'} pi_o, as b and the candidate are drawn.

@@ -76,20 +76,18 @@ DacOneStep::DacOneStep(const AlgorithmInput& in) : DoubleActorCritic(in) {
     unused_head_.emplace_back("critic.u", h, K_ + 1);
     unused_beta_ = OptionBank("beta", K_, in.S, h, 1, g, init_);
   }
-  std::vector<Param*> params = policy_net_.Params();
-  if (NumericIndex()) Append(params, norm_.Params());
+  std::vector<Param*> option_policy = policy_net_.Params();
+  if (NumericIndex()) Append(option_policy, norm_.Params());
   if (Swapped()) {
-    Append(params, y0_.Params());
-    Append(params, y1_.Params());
+    Append(option_policy, y0_.Params());
+    Append(option_policy, y1_.Params());
   }
+  std::vector<Param*> params = option_policy;
   Append(params, critic_net_.Params());
   for (Linear& head : unused_head_) Append(params, head.Params());
   for (Index k = 0; k < K_; ++k) Append(params, policies_.Params(k));
-  for (Index k = 0; k < unused_beta_.K(); ++k) Append(params, unused_beta_[k].Params());
-  const auto in_option_policy = [](const std::string& name) {
-    return name.starts_with("policy.") || name.starts_with("master.") || name.starts_with("ynet.");
-  };
-  AssembleStages(in, std::move(params), in_option_policy, &policies_, &critic_net_);
+  Append(params, unused_beta_.Params());
+  RegisterStages(in, std::move(params), std::move(option_policy), &policies_, &critic_net_);
 }
 
 void DacOneStep::OptionForward(const ConstMatRef& s, std::span<const int> o_prev,

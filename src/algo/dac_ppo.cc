@@ -14,10 +14,9 @@ class DacPpo final : public DoubleActorCritic {
  public:
   explicit DacPpo(const AlgorithmInput& in) : DoubleActorCritic(in) {
     nets_ = MakeOptionNets(in, OptionNets::CriticHead::kQ, init_);
-    const auto in_option_policy = [](const std::string& name) {
-      return name.starts_with("master.") || name.find(".beta.") != std::string::npos;
-    };
-    AssembleStages(in, nets_.Params(), in_option_policy, &nets_.policy, &nets_.critic);
+    std::vector<Param*> option_policy = nets_.master.Params();
+    Append(option_policy, nets_.beta.Params());
+    RegisterStages(in, nets_.Params(), option_policy, &nets_.policy, &nets_.critic);
   }
 
  private:

@@ -6,80 +6,54 @@
 namespace o2v {
 
 DoubleActorCritic::DoubleActorCritic(const AlgorithmInput& in)
-    : Method(in, in.hyper->Int("options", 1), {"high", "low"}),
+    : TwoStageMethod(in),
       w_(in.hyper->Real("entropy_weight")),
       clip_(in.hyper->Real("ratio_clip")),
-      option_log_(in.switches.density_log_eps),
-      rollout_(in, /*critics=*/2) {
-  rollout_.batch.P_old = Mat::Zero(K_, rollout_.batch.Size());
-  o_prev_.assign(std::size_t(N_), 0);
-}
+      option_log_(in.switches.density_log_eps) {}
 
-void DoubleActorCritic::AssembleStages(const AlgorithmInput& in, std::vector<Param*> params,
-                                       const Reaches& in_option_policy, OptionPolicies* policy,
+void DoubleActorCritic::RegisterStages(const AlgorithmInput& in, std::vector<Param*> all,
+                                       std::vector<Param*> option_policy, OptionPolicies* policy,
                                        Net* critic) {
-  const auto in_critic = [](const std::string& name) {
-    return name.starts_with("critic.body.") || name.starts_with("critic.q.");
-  };
-  const Reaches high = [&](const std::string& name) {
-    return in_option_policy(name) || in_critic(name);
-  };
-  const Reaches low = [&](const std::string& name) {
-    return name.find(".mu.") != std::string::npos || name.ends_with(".rho") || in_critic(name);
-  };
-  Assemble(in, std::move(params), {high, low}, policy, critic);
+  std::vector<Param*> action_policy;
+  for (Index k = 0; k < K_; ++k) Append(action_policy, policy->Params(k));
+  Append(option_policy, critic->Params());
+  Append(action_policy, critic->Params());
+  RegisterNetworks(in, std::move(all), {option_policy, action_policy}, policy, critic);
 }
 
-void DoubleActorCritic::Collect(VecEnv& env, std::vector<Episode>& episodes) {
-  policy_->MakeSigma();
-  Batch& batch = rollout_.batch;
-  Cache& c = caches_(N_);
-  c.o.resize(std::size_t(N_));
-  const auto act = [&](Index row) {
-    const Mat& s = env.States();
-    OptionForward(s, o_prev_, env.Init(), When::kActing, c.p);
-    SampleCategorical(c.p, policy_rng_, c.o);
-    SampleAction(*policy_, s, c.o, policy_rng_, rollout_.a, c.action);
-    batch.P_old.middleCols(row, N_) = c.p;
-    option_log_.LogProb(c.p, c.o, c.logp);
-    batch.high.logp_old.segment(row, N_) = c.logp;
-    LogDensity(switches_.density_log_eps, c.action.logp, c.action.slope);
-    batch.low.logp_old.segment(row, N_) = c.action.logp;
-    RecordOptions(row, c.o, env.Init(), batch);
-  };
-  const auto value = [&](const ConstMatRef& s, const ConstMatRef& p, std::span<const int> o,
-                         Index row) {
-    Net::Cache& critic = caches_(s.cols()).value.critic;
-    critic_->Forward(s, critic);
-    rollout_.SetOptionValues(p, critic.out, o, row);
-  };
-  rollout_.Collect(
-      env, episodes, act,
-      [&](Index row, Index n) {
-        value(batch.s.middleCols(row, n), batch.P_old.middleCols(row, n), Rows(batch.o, row, n),
-              row);
-      },
-      [&](const Mat& s, std::span<const char> init) {
-        // The option o ~ p(. | s, o_{t-1}) that is drawn here is thrown away; spec 1.3.
-        OptionForward(s, o_prev_, init, When::kActing, c.p);
-        SampleCategorical(c.p, bootstrap_rng_, c.o);
-        value(s, c.p, c.o, batch.Size());
-      });
+DoubleActorCritic::OptionDistribution DoubleActorCritic::Options(const ConstMatRef& s,
+                                                                 std::span<const int> o_prev,
+                                                                 std::span<const char> init) {
+  Cache& c = caches_(s.cols());
+  OptionForward(s, o_prev, init, When::kActing, c.p);
+  option_log_.Log(c.p, c.log_p);
+  return {c.p, c.log_p};
 }
 
-LossTerms DoubleActorCritic::Loss(int stage, const Batch& batch, const FixedDraws*) {
-  return stage == kHigh ? HighLoss(batch) : LowLoss(batch);
+void DoubleActorCritic::DrawActions(const ConstMatRef& s, std::span<const int> o, Mat& a,
+                                    Vec& logp) {
+  ActionCache& c = caches_(s.cols()).action;
+  SampleAction(*policy_, s, o, policy_rng_, a, c);
+  LogDensity(switches_.density_log_eps, c.logp, c.slope);
+  logp = c.logp;
 }
 
-LossTerms DoubleActorCritic::HighLoss(const Batch& batch) {
+const Mat& DoubleActorCritic::Critic(const ConstMatRef& s, std::span<const int>) {
+  Net::Cache& c = caches_(s.cols()).value.critic;
+  critic_->Forward(s, c);
+  return c.out;
+}
+
+LossTerms DoubleActorCritic::OptionLoss(const Batch& batch, const FixedDraws*) {
   LossTerms terms;
   Cache& c = caches_(batch.Size());
   Net::Cache& critic = c.value.critic;
   OptionForward(batch.s, batch.o_prev, batch.init, When::kUpdate, c.p);
   critic_->Forward(batch.s, critic);
-  option_log_.LogProb(c.p, batch.o, c.logp);
+  option_log_.Log(c.p, c.log_p);
+  PickRows(c.log_p, batch.o, c.logp);
   ClippedSurrogate(c.logp, batch.high.logp_old, batch.high.adv_hat, clip_, terms, c.dlogp);
-  terms.entropy = option_log_.MeanEntropy(c.p);
+  terms.entropy = MeanEntropy(c.p, c.log_p);
   c.value.v = batch.P_old.cwiseProduct(critic.out).colwise().sum().transpose();
   ValueLoss(c.value.v, batch.high.ret, terms, c.value.dv);
   terms.total = terms.surrogate - w_ * terms.entropy + terms.value;
@@ -91,7 +65,7 @@ LossTerms DoubleActorCritic::HighLoss(const Batch& batch) {
   return terms;
 }
 
-LossTerms DoubleActorCritic::LowLoss(const Batch& batch) {
+LossTerms DoubleActorCritic::ActionLoss(const Batch& batch, const FixedDraws*) {
   LossTerms terms;
   Cache& c = caches_(batch.Size());
   ActionLogProb(*policy_, batch, c.action);
@@ -100,14 +74,6 @@ LossTerms DoubleActorCritic::LowLoss(const Batch& batch) {
   EntryValueLoss(*critic_, batch.s, batch.o, batch.low.ret, terms, c.value);
   terms.total = terms.surrogate + terms.value;
   return terms;
-}
-
-const std::vector<Ratio>& DoubleActorCritic::Update() {
-  const int first = order_rng_.Uniform() < 0.5 ? kHigh : kLow;  // fair coin; spec 4.6 (f)
-  for (const int stage : {first, 1 - first}) {
-    rollout_.ForEpochs(shuffle_rng_, [&](const Batch& batch) { Learn(stage, batch); });
-  }
-  return Report();
 }
 
 void DoubleActorCritic::OptionPolicy(const Mat& s, const std::vector<int>& o_prev,

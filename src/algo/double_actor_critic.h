@@ -1,38 +1,33 @@
 #pragma once
-// The two augmented MDPs of DAC and their two-stage PPO, for any option policy.
+// The networks and losses of DAC: one network an option, and an option policy of any form.
 
-#include "algo/method.h"
 #include "algo/option_policy.h"
-#include "algo/ppo_core.h"
+#include "algo/two_stage.h"
 
 namespace o2v {
 
-/// Double actor-critic: the high MDP acts by options o_t at (s_t, o_{t-1}), the low one by actions
-/// a_t at (s_t, o_t); one critic q(s) in R^K serves both. With p the option policy's vector over
-/// options (which some switches leave unnormalised):
+/// Double actor-critic with intra-option policies of their own. With p the option policy's vector
+/// over options (which some switches leave unnormalised):
 ///
-///   high  L = clip-surrogate(ln p_o) - w mean H(p) + 1/2 mean (sum_k p_k^old q_k - R^high)^2
-///   low   L = clip-surrogate(ln pi_o(a | s)) + 1/2 mean (q_o - R^low)^2
+///   option stage  L = clip-surrogate(ln p_o) - w mean H(p)
+///                     + 1/2 mean (sum_k p_k^old q_k - R^option)^2
+///   action stage  L = clip-surrogate(ln pi_o(a | s)) + 1/2 mean (q_o - R^action)^2
 ///
-/// Values v^high_t = sum_k p_k q_k, v^low_t = q_o. After each rollout both stages in random order,
-/// with one Adam. A method brings its option policy. Source: spec 4.6.
-class DoubleActorCritic : public Method {
+/// A method brings its option policy. Source: spec 4.6.
+class DoubleActorCritic : public TwoStageMethod {
  public:
-  void Collect(VecEnv& env, std::vector<Episode>& episodes) override;
-  const std::vector<Ratio>& Update() override;
   void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
                     Mat& P) override;
-  LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) override;
 
  protected:
   /// When the option policy is asked: the loss may see another policy than the one that acted.
   enum class When { kActing, kUpdate };
 
   explicit DoubleActorCritic(const AlgorithmInput& in);
-  /// Assemble for both stages. The critic's output is q. in_option_policy: whether the parameter of
-  /// this name belongs to the option policy.
-  void AssembleStages(const AlgorithmInput& in, std::vector<Param*> params,
-                      const Reaches& in_option_policy, OptionPolicies* policy, Net* critic);
+  /// RegisterNetworks for both stages. all: every parameter in the order of the network, the
+  /// unused ones included; option_policy: those of the option policy. The critic's output is q.
+  void RegisterStages(const AlgorithmInput& in, std::vector<Param*> all,
+                      std::vector<Param*> option_policy, OptionPolicies* policy, Net* critic);
 
   /// s (S, B), o_prev, init (B) -> p (K, B).
   virtual void OptionForward(const ConstMatRef& s, std::span<const int> o_prev,
@@ -42,26 +37,24 @@ class DoubleActorCritic : public Method {
                               std::span<const char> init, const Mat& dp) = 0;
 
  private:
-  enum Stage { kHigh = 0, kLow = 1 };
-
   /// What a batch of B samples leaves behind.
   struct Cache {
     ActionCache action;
-    ValueCache value;    // value.critic.out is q (K, B)
-    Mat p, dp;           // (K, B)
-    std::vector<int> o;  // (B)
-    Vec logp, dlogp;     // (B) ln p_o
+    ValueCache value;  // value.critic.out is q (K, B)
+    Mat p, log_p, dp;  // (K, B)
+    Vec logp, dlogp;   // (B) ln p_o
   };
 
-  LossTerms HighLoss(const Batch& batch);
-  LossTerms LowLoss(const Batch& batch);
+  OptionDistribution Options(const ConstMatRef& s, std::span<const int> o_prev,
+                             std::span<const char> init) override;
+  void DrawActions(const ConstMatRef& s, std::span<const int> o, Mat& a, Vec& logp) override;
+  const Mat& Critic(const ConstMatRef& s, std::span<const int> o) override;
+  LossTerms OptionLoss(const Batch& batch, const FixedDraws* fixed) override;
+  LossTerms ActionLoss(const Batch& batch, const FixedDraws* fixed) override;
 
-  const double w_;     // entropy weight of the high stage
+  const double w_;     // entropy weight of the option stage
   const double clip_;  // c
   const OptionLog option_log_;
-  Rng &policy_rng_ = NewStream("policy"), &bootstrap_rng_ = NewStream("bootstrap"),
-      &shuffle_rng_ = NewStream("shuffle"), &order_rng_ = NewStream("order");
-  PpoRollout rollout_;
   CacheByWidth<Cache> caches_;
 };
 

@@ -85,7 +85,6 @@ class Iopg final : public Method {
   void BackwardHistory(std::span<const int> init, Index n);
 
   const double gamma_;
-  Rng& policy_rng_ = NewStream("policy");
   OptionNets nets_;  // the master copy
   std::vector<Worker> workers_;
 
@@ -120,8 +119,7 @@ Iopg::Iopg(const AlgorithmInput& in)
     worker.r = VecD::Zero(room);
     worker.init.assign(std::size_t(room), 0);
   }
-  const auto reached = [](const std::string& name) { return !name.starts_with("critic.u."); };
-  Assemble(in, nets_.Params(), {reached}, &nets_.policy, &nets_.critic);
+  RegisterNetworks(in, nets_.Params(), {nets_.UsedParams()}, &nets_.policy, &nets_.critic);
   finished_.reserve(workers_.size());
   history_.Resize(K_, room);
   init_given_.reserve(std::size_t(room));
@@ -166,7 +164,6 @@ const Mat& Iopg::Options(OptionNets& nets, const ConstMatRef& s, std::span<const
 void Iopg::Collect(VecEnv& env, std::vector<Episode>& episodes) {
   finished_.clear();
   Asked& c = asked_(1);
-  for (Worker& worker : workers_) worker.nets.policy.MakeSigma();
   while (finished_.empty()) {
     for (std::size_t i = 0; i < workers_.size(); ++i) {
       Worker& worker = workers_[i];
@@ -332,7 +329,6 @@ LossTerms Iopg::EpisodeLoss(OptionNets& nets, const ConstMatRef& s, const ConstM
   init_given_[0] = 1;
   if (AlwaysInitial()) std::fill(init_given_.begin(), init_given_.end(), 1);
   const bool betas = !AlwaysInitial();
-  nets.policy.MakeSigma();
 
   // Everything that the networks say.
   for (Index start = 0, i = 0; start < n; start += kBlock, ++i) {
@@ -375,7 +371,7 @@ LossTerms Iopg::EpisodeLoss(OptionNets& nets, const ConstMatRef& s, const ConstM
     h.dv(t) = -A_t / double(n);
   }
   BackwardHistory(init_given_, n);
-  terms.entropy = GaussianMeanEntropy(nets.policy.sigma());
+  terms.entropy = GaussianMeanEntropy(blocks_[0]->policy.sigma_of);
   terms.total = terms.surrogate + terms.value;
 
   for (Index start = 0, i = 0; start < n; start += kBlock, ++i) {

@@ -64,13 +64,13 @@ std::vector<std::string> Method::StatNames() const {
 
 Method::Method(const AlgorithmInput& in, Index K, std::vector<std::string> stages,
                const LossColumns& more)
-    : switches_(in.switches),
+    : seed_(in.seed),
+      init_rng_(in.seed, "init"),
+      switches_(in.switches),
       K_(K),
       N_(in.workers),
       init_(in.draw_weights ? Initialiser(init_rng_) : Initialiser()),
       usage_(K),
-      seed_(in.seed),
-      init_rng_(in.seed, "init"),
       stages_(std::move(stages)),
       more_(more),
       means_(stages_.size(), LossMeans(more)) {}
@@ -79,14 +79,15 @@ Rng& Method::NewStream(const std::string& name) {
   return streams_.emplace_back(name, Rng(seed_, name)).second;
 }
 
-void Method::Assemble(const AlgorithmInput& in, std::vector<Param*> params,
-                      std::initializer_list<Reaches> reaches, OptionPolicies* policy, Net* critic) {
+void Method::RegisterNetworks(const AlgorithmInput& in, std::vector<Param*> all,
+                              std::initializer_list<std::vector<Param*>> stages,
+                              OptionPolicies* policy, Net* critic) {
   policy_ = policy;
   critic_ = critic;
-  params_ = std::move(params);
-  for (const Reaches& reached : reaches) {
+  params_ = std::move(all);
+  for (const std::vector<Param*>& reached : stages) {
     std::vector<char>& in_graph = in_graph_.emplace_back();
-    for (const Param* p : params_) in_graph.push_back(reached(p->name));
+    for (const Param* p : params_) in_graph.push_back(std::ranges::count(reached, p) > 0);
   }
   const Settings& s = *in.hyper;
   adam_ = std::make_unique<Adam>(
@@ -121,7 +122,6 @@ OptionNets MakeOptionNets(const AlgorithmInput& in, OptionNets::CriticHead head,
 
 void Method::ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, Mat& sigma) {
   OptionPolicies::Cache& c = asked_(s.cols()).policy;
-  policy_->MakeSigma();
   policy_->ForwardOne(s, o, c);
   mu = c.nets.out;
   sigma = c.sigma;

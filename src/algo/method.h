@@ -2,7 +2,7 @@
 // What all methods do alike beside their mathematics.
 
 #include <deque>
-#include <functional>
+#include <initializer_list>
 #include <map>
 #include <memory>
 #include <string>
@@ -56,6 +56,10 @@ class OptionUsage {
 /// networks are asked alike. How a method acts (Collect, OptionPolicy) and what it learns (Loss,
 /// Update) is in its own file.
 class Method : public Algorithm {
+  const std::uint64_t seed_;
+  Rng init_rng_;                                     // not part of the state
+  std::deque<std::pair<std::string, Rng>> streams_;  // which stay where they are
+
  public:
   /// Parameters, optimiser, random streams and o_prev_.
   void Visit(StateVisitor& v) override;
@@ -64,9 +68,9 @@ class Method : public Algorithm {
 
   std::vector<Param*> Params() override { return params_; }
   int NumOptions() const override { return int(std::max<Index>(K_, 1)); }
-  /// Of the intra-option policies given to Assemble.
+  /// Of the intra-option policies given to RegisterNetworks.
   void ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, Mat& sigma) override;
-  /// The first K outputs of the critic given to Assemble.
+  /// The first K outputs of the critic given to RegisterNetworks.
   void OptionValues(const Mat& s, const std::vector<int>& o, Mat& q) override;
 
   std::vector<std::string> Stages() const override { return stages_; }
@@ -74,8 +78,6 @@ class Method : public Algorithm {
   std::vector<char> InGraph(int stage) const override { return in_graph_[std::size_t(stage)]; }
 
  protected:
-  /// Whether a stage's loss reaches the parameter of this name.
-  using Reaches = std::function<bool(const std::string& name)>;
   struct Asked {
     OptionPolicies::Cache policy;
     Net::Cache critic;
@@ -86,10 +88,12 @@ class Method : public Algorithm {
          const LossColumns& more = {});
   /// A random stream that is part of the state.
   Rng& NewStream(const std::string& name);
-  /// Closes construction, when the method's networks exist: pointers to them are kept. `reaches`
-  /// has an entry a stage; a method that answers the queries itself has neither policy nor critic.
-  void Assemble(const AlgorithmInput& in, std::vector<Param*> params,
-                std::initializer_list<Reaches> reaches, OptionPolicies* policy, Net* critic);
+  /// Closes construction, when the method's networks exist: pointers to them are kept.
+  /// all: every parameter in the order of the network; stages: those that each stage's loss
+  /// reaches. A method that answers the queries itself has neither policy nor critic.
+  void RegisterNetworks(const AlgorithmInput& in, std::vector<Param*> all,
+                        std::initializer_list<std::vector<Param*>> stages, OptionPolicies* policy,
+                        Net* critic);
 
   /// A step of the optimiser on the gradients of a loss with these terms.
   void StepOn(int stage, const LossTerms& terms) { means_[stage].Add(terms, Step(stage)); }
@@ -116,16 +120,14 @@ class Method : public Algorithm {
   std::vector<std::vector<char>> in_graph_;  // of each stage
   std::vector<int> o_prev_;                  // (N), empty where a method keeps them elsewhere
   OptionUsage usage_;
-  CacheByWidth<Asked> asked_;         // scratch of the queries
-  OptionPolicies* policy_ = nullptr;  // the method's
+  Rng& policy_rng_ = NewStream("policy");  // of options and actions drawn while acting
+  CacheByWidth<Asked> asked_;              // scratch of the queries
+  OptionPolicies* policy_ = nullptr;       // the method's
   Net* critic_ = nullptr;
 
  private:
-  const std::uint64_t seed_;
-  Rng init_rng_;  // not part of the state
   const std::vector<std::string> stages_;
   const LossColumns more_;
-  std::deque<std::pair<std::string, Rng>> streams_;  // which stay where they are
   std::unique_ptr<Adam> adam_;
   std::vector<LossMeans> means_;  // of each stage
   std::vector<Ratio> ratios_;     // of the last Report

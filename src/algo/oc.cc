@@ -1,8 +1,8 @@
 #include "algo/method.h"
 #include "algo/option_policy.h"
-#include "algo/ppo_core.h"
 #include "dist/categorical.h"
 #include "dist/diag_gaussian.h"
+#include "rollout/rollout.h"
 
 namespace o2v {
 namespace {
@@ -55,7 +55,6 @@ class OptionCritic final : public Method {
   const int T_;
   const Real w_, eta_, epsilon_;
   const int target_every_;  // [environment steps a worker]
-  Rng& policy_rng_ = NewStream("policy");
   OptionNets nets_, target_;
   std::vector<Param*> target_params_;
 
@@ -77,10 +76,10 @@ OptionCritic::OptionCritic(const AlgorithmInput& in)
   nets_ = MakeOptionNets(in, OptionNets::CriticHead::kQ, init_);
   target_ = nets_;
   target_params_ = target_.Params();
-  const auto reached = [](const std::string& name) {
-    return !name.starts_with("critic.u.") && !name.starts_with("master.");
-  };
-  Assemble(in, nets_.Params(), {reached}, &nets_.policy, &nets_.critic);
+  std::vector<Param*> used = nets_.critic.Params();  // no master policy
+  for (Index k = 0; k < K_; ++k) Append(used, nets_.policy.Params(k));
+  Append(used, nets_.beta.Params());
+  RegisterNetworks(in, nets_.Params(), {used}, &nets_.policy, &nets_.critic);
 
   const Index n = Index(N_) * T_;
   rollout_.Resize(in.S, in.A, n);
@@ -132,7 +131,6 @@ void OptionCritic::TargetValue(const ConstMatRef& s, std::span<const int> o, Cac
 }
 
 void OptionCritic::Collect(VecEnv& env, std::vector<Episode>& episodes) {
-  nets_.policy.MakeSigma();
   Cache& c = caches_(N_);
   OptionPolicies::Cache& policy = c.action.policy;
   c.o.resize(std::size_t(N_));

@@ -1,6 +1,5 @@
-#include "algo/method.h"
 #include "algo/option2vec_nets.h"
-#include "algo/ppo_core.h"
+#include "algo/two_stage.h"
 #include "base/check.h"
 #include "dist/categorical.h"
 #include "dist/diag_gaussian.h"
@@ -26,12 +25,10 @@ namespace {
 /// critic for all options, fed with o_hat; V_bar in the loss takes P as it is, not as it was in the
 /// rollout; logarithms are the softmax's own.
 /// Source: spec 2.6, 2.7, 4.8, 6; paper Eq. (3), (8)-(10).
-class Option2Vec final : public Method {
+class Option2Vec final : public TwoStageMethod {
  public:
   explicit Option2Vec(const AlgorithmInput& in);
 
-  void Collect(VecEnv& env, std::vector<Episode>& episodes) override;
-  const std::vector<Ratio>& Update() override;
   void ChangeTask() override { Freeze(); }
   void Visit(StateVisitor& v) override;
   void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
@@ -40,11 +37,8 @@ class Option2Vec final : public Method {
   void OptionValues(const Mat& s, const std::vector<int>& o, Mat& q) override;
   Param* Embedding() override { return &options_.W_o; }
   void MeanJacobian(const Mat& s, const std::vector<int>& o, MatD& J) override;
-  LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) override;
 
  private:
-  enum Stage { kHigh = 0, kLow = 1 };
-
   /// What a batch of B samples leaves behind.
   struct Cache {
     OptionPolicyNet::Cache options;
@@ -56,11 +50,16 @@ class Option2Vec final : public Method {
 
   /// From now on `o2v_freeze` acts.
   void Freeze();
-  void MakeTables();
+  OptionDistribution Options(const ConstMatRef& s, std::span<const int> o_prev,
+                             std::span<const char> init) override;
+  void DrawActions(const ConstMatRef& s, std::span<const int> o, Mat& a, Vec& logp) override;
+  const Mat& Critic(const ConstMatRef& s, std::span<const int> o) override;
+  void BeforeRollout() override;
+  void AfterRollout() override;
   /// Masks for a pass over B samples: drawn, or taken from `fixed`; null without dropout.
   const AttentionBlock::Masks* Dropout(Index B, const FixedDraws* fixed, Cache& c);
-  LossTerms OptionLoss(const Batch& batch, const FixedDraws* fixed);
-  LossTerms ActionLoss(const Batch& batch, const FixedDraws* fixed);
+  LossTerms OptionLoss(const Batch& batch, const FixedDraws* fixed) override;
+  LossTerms ActionLoss(const Batch& batch, const FixedDraws* fixed) override;
 
   static bool Paper(Fidelity f) { return f == Fidelity::kPaper; }
 
@@ -68,9 +67,7 @@ class Option2Vec final : public Method {
   const double w_o_, w_a_;  // entropy weights of option and action stage
   const Option2VecSizes sizes_;
   const bool scalar_critic_;
-  Rng &policy_rng_ = NewStream("policy"), &dropout_rng_ = NewStream("dropout"),
-      &bootstrap_rng_ = NewStream("bootstrap"), &redraw_rng_ = NewStream("redraw"),
-      &shuffle_rng_ = NewStream("shuffle"), &order_rng_ = NewStream("order");
+  Rng &dropout_rng_ = NewStream("dropout"), &redraw_rng_ = NewStream("redraw");
 
   OptionPolicyNet options_;
   ActionPolicyNet action_;
@@ -78,9 +75,8 @@ class Option2Vec final : public Method {
   std::vector<LayerNorm> unused_;         // one or none: spec 2.6 item 9
   std::vector<std::size_t> init_params_;  // positions of the initial net in Params()
   bool frozen_ = false;                   // the task has changed, and o2v_freeze acts
-
-  PpoRollout rollout_;
-  Mat rollout_P_;  // (K, T N)
+  OptionPolicyNet::Tables tables_;        // of the weights as they stood when they were made
+  Mat action_table_, critic_table_;
   CacheByWidth<Cache> caches_;
 };
 
@@ -97,13 +93,12 @@ Option2VecSizes ReadSizes(const AlgorithmInput& in) {
 }
 
 Option2Vec::Option2Vec(const AlgorithmInput& in)
-    : Method(in, in.hyper->Int("options", 1), {"high", "low"}),
+    : TwoStageMethod(in),
       clip_(in.hyper->Real("ratio_clip")),
       w_o_(in.hyper->Real("entropy_weight_option")),
       w_a_(in.hyper->Real("entropy_weight_action")),
       sizes_(ReadSizes(in)),
-      scalar_critic_(Paper(switches_.o2v_critic)),
-      rollout_(in, /*critics=*/2) {
+      scalar_critic_(Paper(switches_.o2v_critic)) {
   const OptionPolicyNet::Form form{.two_tokens = !Paper(switches_.o2v_query),
                                    .init_relu = !Paper(switches_.o2v_init_relu),
                                    .prev_embed_grad = Paper(switches_.o2v_prev_embed_grad)};
@@ -120,18 +115,13 @@ Option2Vec::Option2Vec(const AlgorithmInput& in)
   Append(params, action_.Params());
   Append(params, critic_net_.Params());
   for (LayerNorm& norm : unused_) Append(params, norm.Params());
-  const auto in_high = [](const std::string& name) {
-    return !name.starts_with("action.") && !name.starts_with("unused.");
-  };
-  const auto in_low = [](const std::string& name) {
-    return name.starts_with("action.") || name.starts_with("critic.");
-  };
-  Assemble(in, std::move(params), {in_high, in_low}, nullptr, nullptr);
+  std::vector<Param*> option_stage = options_.Params(), action_stage = action_.Params();
+  Append(option_stage, critic_net_.Params());
+  Append(action_stage, critic_net_.Params());
+  RegisterNetworks(in, std::move(params), {option_stage, action_stage}, nullptr, nullptr);
   for (std::size_t i = 0; i < params_.size(); ++i) {
-    if (params_[i]->name.starts_with("init.")) init_params_.push_back(i);
+    if (std::ranges::count(options_.InitParams(), params_[i]) > 0) init_params_.push_back(i);
   }
-  rollout_P_ = Mat::Zero(K_, rollout_.batch.Size());
-  o_prev_.assign(std::size_t(N_), 0);
 }
 
 void Option2Vec::Visit(StateVisitor& v) {
@@ -147,15 +137,9 @@ void Option2Vec::Freeze() {
   const bool policy = switches_.o2v_freeze == o2v::Freeze::kPolicy;
   for (std::size_t i = 0; i < options_.Params().size(); ++i) {  // the first of Params()
     if (!policy && params_[i] != &options_.W_o) continue;
-    in_graph_[kHigh][i] = 0;
+    in_graph_[kOption][i] = 0;
     if (switches_.o2v_freeze == o2v::Freeze::kPaper) Hold(i);
   }
-}
-
-void Option2Vec::MakeTables() {
-  options_.MakeTables();
-  action_.MakeTable(options_.W_o.value);
-  critic_net_.MakeTable(options_.W_o.value);
 }
 
 // ---- Rollout ------------------------------------------------------------------------------------
@@ -182,54 +166,41 @@ const AttentionBlock::Masks* Option2Vec::Dropout(Index B, const FixedDraws* fixe
   return &masks;
 }
 
-void Option2Vec::Collect(VecEnv& env, std::vector<Episode>& episodes) {
-  MakeTables();
-  Batch& batch = rollout_.batch;
-  Cache& c = caches_(N_);
-  c.o.resize(std::size_t(N_));
-  const auto act = [&](Index row) {
-    const Mat& s = env.States();
-    options_.Forward(s, o_prev_, env.Init(), Dropout(N_, nullptr, c), c.options);
-    SampleCategorical(c.options.P, policy_rng_, c.o);
-    action_.Forward(s, c.o, c.action);
-    SampleGaussian(c.action.mu, c.action.sigma, policy_rng_, rollout_.a);
-    rollout_P_.middleCols(row, N_) = c.options.P;
-    for (Index i = 0; i < N_; ++i) {
-      batch.high.logp_old(row + i) = c.options.log_P(c.o[std::size_t(i)], i);
-    }
-    GaussianLogProb(rollout_.a, c.action.mu, c.action.sigma, c.logp);
-    batch.low.logp_old.segment(row, N_) = c.logp;
-    RecordOptions(row, c.o, env.Init(), batch);
-  };
-  const auto value = [&](const ConstMatRef& s, const ConstMatRef& P, std::span<const int> o,
-                         Index row) {
-    OptionValueNet::Cache& all = caches_(s.cols()).all;
-    critic_net_.ForwardAll(s, o, options_.W_o.value, all);
-    rollout_.SetOptionValues(P, all.q, o, row);  // V_bar and Q_O[s, o]
-  };
-  rollout_.Collect(
-      env, episodes, act,
-      [&](Index row, Index n) {
-        value(batch.s.middleCols(row, n), rollout_P_.middleCols(row, n), Rows(batch.o, row, n),
-              row);
-      },
-      [&](const Mat& s, std::span<const char> init) {
-        // The option o ~ P(. | s, o_{t-1}) that is drawn here is thrown away; spec 1.3.
-        options_.Forward(s, o_prev_, init, Dropout(N_, nullptr, c), c.options);
-        SampleCategorical(c.options.P, bootstrap_rng_, c.o);
-        value(s, c.options.P, c.o, batch.Size());
-      });
+Option2Vec::OptionDistribution Option2Vec::Options(const ConstMatRef& s,
+                                                   std::span<const int> o_prev,
+                                                   std::span<const char> init) {
+  Cache& c = caches_(s.cols());
+  options_.Forward(s, o_prev, init, tables_, Dropout(s.cols(), nullptr, c), c.options);
+  return {c.options.P, c.options.log_P};
+}
+
+void Option2Vec::DrawActions(const ConstMatRef& s, std::span<const int> o, Mat& a, Vec& logp) {
+  ActionPolicyNet::Cache& c = caches_(s.cols()).action;
+  action_.Forward(s, o, action_table_, c);
+  SampleGaussian(c.mu, c.sigma, policy_rng_, a);
+  GaussianLogProb(a, c.mu, c.sigma, logp);
+}
+
+const Mat& Option2Vec::Critic(const ConstMatRef& s, std::span<const int> o) {
+  OptionValueNet::Cache& c = caches_(s.cols()).all;
+  critic_net_.ForwardAll(s, o, options_.W_o.value, critic_table_, c);
+  return c.q;
+}
+
+void Option2Vec::BeforeRollout() {
+  options_.Tabulate(tables_);
+  action_.Tabulate(options_.W_o.value, action_table_);
+  critic_net_.Tabulate(options_.W_o.value, critic_table_);
+}
+
+/// By the switch the update is given done_t = init_{t+1} for init_t.
+void Option2Vec::AfterRollout() {
   if (Paper(switches_.o2v_init_flag)) return;
-  for (std::size_t i = 0; i < batch.init.size(); ++i) {  // the update is given done_t = init_{t+1}
-    batch.init[i] = rollout_.mask.data()[i] == 0;
-  }
+  std::vector<char>& init = rollout_.batch.init;
+  for (std::size_t i = 0; i < init.size(); ++i) init[i] = rollout_.mask.data()[i] == 0;
 }
 
 // ---- Losses -------------------------------------------------------------------------------------
-
-LossTerms Option2Vec::Loss(int stage, const Batch& batch, const FixedDraws* fixed) {
-  return stage == kHigh ? OptionLoss(batch, fixed) : ActionLoss(batch, fixed);
-}
 
 LossTerms Option2Vec::OptionLoss(const Batch& batch, const FixedDraws* fixed) {
   LossTerms terms;
@@ -237,10 +208,10 @@ LossTerms Option2Vec::OptionLoss(const Batch& batch, const FixedDraws* fixed) {
   const Mat& W_o = options_.W_o.value;
   Cache& c = caches_(B);
   const Mat &P = c.options.P, &log_P = c.options.log_P, &q = c.all.q;
-  options_.MakeTables();
-  critic_net_.MakeTable(W_o);
+  options_.Tabulate(tables_);
+  critic_net_.Tabulate(W_o, critic_table_);
   const AttentionBlock::Masks* masks = Dropout(B, fixed, c);
-  options_.Forward(batch.s, batch.o_prev, batch.init, masks, c.options);
+  options_.Forward(batch.s, batch.o_prev, batch.init, tables_, masks, c.options);
   c.o = batch.o;
   if (!scalar_critic_ && !Paper(switches_.o2v_option_in_update)) {
     if (fixed && !fixed->o.empty()) {
@@ -249,7 +220,7 @@ LossTerms Option2Vec::OptionLoss(const Batch& batch, const FixedDraws* fixed) {
       SampleCategorical(P, redraw_rng_, c.o);
     }
   }
-  critic_net_.ForwardAll(batch.s, c.o, W_o, c.all);
+  critic_net_.ForwardAll(batch.s, c.o, W_o, critic_table_, c.all);
 
   c.logp.resize(B);
   c.v.resize(B);
@@ -277,11 +248,11 @@ LossTerms Option2Vec::OptionLoss(const Batch& batch, const FixedDraws* fixed) {
   }
   critic_net_.Backward(batch.s, c.o, W_o, c.all);
   if (frozen_ && switches_.o2v_freeze == o2v::Freeze::kPolicy) return terms;  // P is detached
-  options_.Backward(batch.s, batch.o_prev, masks, c.options);
+  options_.Backward(batch.s, batch.o_prev, tables_, masks, c.options);
   if (frozen_) options_.W_o.grad.setZero();
   if (!Paper(switches_.adam_idle)) {
     // The initial net enters the graph with the first flagged row; spec 2.7.
-    for (const std::size_t i : init_params_) in_graph_[kHigh][i] = !c.options.init_rows.empty();
+    for (const std::size_t i : init_params_) in_graph_[kOption][i] = !c.options.init_rows.empty();
   }
   return terms;
 }
@@ -291,20 +262,20 @@ LossTerms Option2Vec::ActionLoss(const Batch& batch, const FixedDraws* fixed) {
   const Index B = batch.Size();
   const Mat& W_o = options_.W_o.value;
   Cache& c = caches_(B);
-  action_.MakeTable(W_o);
-  critic_net_.MakeTable(W_o);
+  action_.Tabulate(W_o, action_table_);
+  critic_net_.Tabulate(W_o, critic_table_);
   c.o = batch.o;
   if (!Paper(switches_.o2v_option_in_update)) {
     if (fixed && !fixed->o.empty()) {
       c.o = fixed->o;
     } else {
-      options_.MakeTables();
-      options_.Forward(batch.s, batch.o_prev, batch.init, Dropout(B, fixed, c), c.options);
+      options_.Tabulate(tables_);
+      options_.Forward(batch.s, batch.o_prev, batch.init, tables_, Dropout(B, fixed, c), c.options);
       SampleCategorical(c.options.P, redraw_rng_, c.o);
     }
   }
   const Mat &mu = c.action.mu, &sigma = c.action.sigma;
-  action_.Forward(batch.s, c.o, c.action);
+  action_.Forward(batch.s, c.o, action_table_, c.action);
   GaussianLogProb(batch.a, mu, sigma, c.logp);
   ClippedSurrogate(c.logp, batch.low.logp_old, batch.low.adv_hat, clip_, terms, c.dlogp);
   terms.entropy = GaussianMeanEntropy(sigma);
@@ -315,10 +286,10 @@ LossTerms Option2Vec::ActionLoss(const Batch& batch, const FixedDraws* fixed) {
   OptionValueNet::Cache& critic = scalar_critic_ ? c.one : c.all;
   c.v.resize(B);
   if (scalar_critic_) {
-    critic_net_.ForwardOne(batch.s, c.o, critic);
+    critic_net_.ForwardOne(batch.s, c.o, critic_table_, critic);
     c.v = critic.q.row(0).transpose();
   } else {
-    critic_net_.ForwardAll(batch.s, c.o, W_o, critic);
+    critic_net_.ForwardAll(batch.s, c.o, W_o, critic_table_, critic);
     for (Index b = 0; b < B; ++b) c.v(b) = critic.q(c.o[std::size_t(b)], b);
   }
   ValueLoss(c.v, batch.low.ret, terms, c.dv);
@@ -329,44 +300,34 @@ LossTerms Option2Vec::ActionLoss(const Batch& batch, const FixedDraws* fixed) {
   return terms;
 }
 
-// ---- Update -------------------------------------------------------------------------------------
-
-const std::vector<Ratio>& Option2Vec::Update() {
-  const int first = order_rng_.Uniform() < 0.5 ? kHigh : kLow;  // fair coin; spec 4.8 (f)
-  for (const int stage : {first, 1 - first}) {
-    rollout_.ForEpochs(shuffle_rng_, [&](const Batch& batch) { Learn(stage, batch); });
-  }
-  return Report();
-}
-
 // ---- Queries ------------------------------------------------------------------------------------
 
 void Option2Vec::OptionPolicy(const Mat& s, const std::vector<int>& o_prev,
                               const std::vector<char>& init, Mat& P) {
   Cache& c = caches_(s.cols());
-  options_.MakeTables();
-  options_.Forward(s, o_prev, init, nullptr, c.options);
+  options_.Tabulate(tables_);
+  options_.Forward(s, o_prev, init, tables_, nullptr, c.options);
   P = c.options.P;
 }
 
 void Option2Vec::ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, Mat& sigma) {
   Cache& c = caches_(s.cols());
-  action_.MakeTable(options_.W_o.value);
-  action_.Forward(s, o, c.action);
+  action_.Tabulate(options_.W_o.value, action_table_);
+  action_.Forward(s, o, action_table_, c.action);
   mu = c.action.mu;
   sigma = c.action.sigma;
 }
 
 void Option2Vec::OptionValues(const Mat& s, const std::vector<int>& o, Mat& q) {
   Cache& c = caches_(s.cols());
-  critic_net_.MakeTable(options_.W_o.value);
-  critic_net_.ForwardAll(s, o, options_.W_o.value, c.all);
+  critic_net_.Tabulate(options_.W_o.value, critic_table_);
+  critic_net_.ForwardAll(s, o, options_.W_o.value, critic_table_, c.all);
   q = c.all.q;
 }
 
 void Option2Vec::MeanJacobian(const Mat& s, const std::vector<int>& o, MatD& J) {
-  action_.MakeTable(options_.W_o.value);
-  action_.MeanJacobian(s, o, caches_(s.cols()).action, J);
+  action_.Tabulate(options_.W_o.value, action_table_);
+  action_.MeanJacobian(s, o, action_table_, caches_(s.cols()).action, J);
 }
 
 }  // namespace

@@ -71,14 +71,20 @@ std::vector<Param*> OptionPolicyNet::Params() {
   return params;
 }
 
-void OptionPolicyNet::MakeTables() {
-  block.attention.Project(W_o.value, memory_);
-  if (!form_.two_tokens) query.MakeTable(W_o.value, table_);
+std::vector<Param*> OptionPolicyNet::InitParams() {
+  std::vector<Param*> params = init0.Params();
+  Append(params, init1.Params());
+  return params;
+}
+
+void OptionPolicyNet::Tabulate(Tables& tables) const {
+  block.attention.Project(W_o.value, tables.memory);
+  if (!form_.two_tokens) query.MakeTable(W_o.value, tables.query);
 }
 
 void OptionPolicyNet::Forward(const ConstMatRef& s, std::span<const int> o_prev,
-                              std::span<const char> init, const AttentionBlock::Masks* masks,
-                              Cache& c) const {
+                              std::span<const char> init, const Tables& tables,
+                              const AttentionBlock::Masks* masks, Cache& c) const {
   const Index B = s.cols(), D = W_o.value.rows(), K = W_o.value.cols();
   c.x.resize(D, Tokens() * B);
   c.relu.resize(D, B);
@@ -88,10 +94,10 @@ void OptionPolicyNet::Forward(const ConstMatRef& s, std::span<const int> o_prev,
     GatherColumns(W_o.value, o_prev, c.x.rightCols(B));
   } else {
     query.MultiplyState(s, c.relu);
-    AddTableRelu(table_, o_prev, c.relu);
+    AddTableRelu(tables.query, o_prev, c.relu);
   }
   norm.Forward(c.relu, c.norm, c.x.leftCols(B));
-  block.Forward(c.x, memory_, masks, c.block);
+  block.Forward(c.x, tables.memory, masks, c.block);
 
   c.z.resize(K, B);
   SetAB(logits.W.value.leftCols(D), c.block.out.leftCols(B), c.z);
@@ -139,7 +145,7 @@ void OptionPolicyNet::BackwardInitial(Cache& c) {
 }
 
 void OptionPolicyNet::Backward(const ConstMatRef& s, std::span<const int> o_prev,
-                               const AttentionBlock::Masks* masks, Cache& c) {
+                               const Tables& tables, const AttentionBlock::Masks* masks, Cache& c) {
   const Index B = s.cols(), D = W_o.value.rows(), K = W_o.value.cols();
   BackwardInitial(c);
   c.dtokens.resize(D, Tokens() * B);
@@ -150,7 +156,7 @@ void OptionPolicyNet::Backward(const ConstMatRef& s, std::span<const int> o_prev
   logits.b.grad.col(0) += c.dz.rowwise().sum();
 
   c.dx.resize(D, form_.prev_embed_grad ? Tokens() * B : B);  // the state's token is the first
-  block.Backward(c.x, W_o.value, memory_, masks, c.block, c.dtokens, c.dx, W_o.grad);
+  block.Backward(c.x, W_o.value, tables.memory, masks, c.block, c.dtokens, c.dx, W_o.grad);
   auto dx0 = c.dx.leftCols(B);
   norm.Backward(c.norm, dx0, dx0);
   ActivationBackward(Activation::kRelu, c.relu, dx0);
@@ -159,9 +165,9 @@ void OptionPolicyNet::Backward(const ConstMatRef& s, std::span<const int> o_prev
     if (form_.prev_embed_grad) ScatterColumns(c.dx.rightCols(B), o_prev, W_o.grad);
   } else {
     query.AddStateGrad(s, dx0);
-    dtable_.setZero(D, K);
-    ScatterColumns(dx0, o_prev, dtable_);
-    query.AddTableGrad(W_o.value, dtable_, form_.prev_embed_grad ? &W_o.grad : nullptr);
+    c.dtable.setZero(D, K);
+    ScatterColumns(dx0, o_prev, c.dtable);
+    query.AddTableGrad(W_o.value, c.dtable, form_.prev_embed_grad ? &W_o.grad : nullptr);
   }
 }
 
@@ -186,14 +192,15 @@ std::vector<Param*> ActionPolicyNet::Params() {
   return params;
 }
 
-void ActionPolicyNet::Forward(const ConstMatRef& s, std::span<const int> o, Cache& c) const {
+void ActionPolicyNet::Forward(const ConstMatRef& s, std::span<const int> o, const Mat& table,
+                              Cache& c) const {
   const Index h = layer1.W.value.rows(), A = mu.W.value.rows(), B = s.cols();
   c.h0.resize(h, B);
   c.h1.resize(h, B);
   c.mu.resize(A, B);
   c.sigma.resize(A, B);
   layer0.MultiplyState(s, c.h0);
-  AddTableRelu(table_, o, c.h0);
+  AddTableRelu(table, o, c.h0);
   layer1.Multiply(c.h0, c.h1);
   BiasActivate(Activation::kRelu, layer1.b.value, c.h1);
   mu.Multiply(c.h1, c.mu);
@@ -217,14 +224,14 @@ void ActionPolicyNet::Backward(const ConstMatRef& s, std::span<const int> o, con
   layer1.BackwardInput(c.dh1, c.dh0);
   ActivationBackward(Activation::kRelu, c.h0, c.dh0);
   layer0.AddStateGrad(s, c.dh0);
-  dtable_.setZero(c.h0.rows(), W_o.cols());
-  ScatterColumns(c.dh0, o, dtable_);
-  layer0.AddTableGrad(W_o, dtable_, nullptr);  // o_hat is detached
+  c.dtable.setZero(c.h0.rows(), W_o.cols());
+  ScatterColumns(c.dh0, o, c.dtable);
+  layer0.AddTableGrad(W_o, c.dtable, nullptr);  // o_hat is detached
 }
 
-void ActionPolicyNet::MeanJacobian(const ConstMatRef& s, std::span<const int> o, Cache& c,
-                                   MatD& J) const {
-  Forward(s, o, c);
+void ActionPolicyNet::MeanJacobian(const ConstMatRef& s, std::span<const int> o, const Mat& table,
+                                   Cache& c, MatD& J) const {
+  Forward(s, o, table, c);
   const Index h = layer1.W.value.rows(), D = layer0.W.value.cols() - s.rows();
   const auto on = [](const auto& y) -> Vec { return (y.array() > 0).template cast<Real>(); };
   MatD sum = MatD::Zero(mu.W.value.rows(), h);  // of what stands before W_e
@@ -274,14 +281,14 @@ void OptionValueNet::ForwardHead(Cache& c) const {
 }
 
 void OptionValueNet::ForwardAll(const ConstMatRef& s, std::span<const int> o, const Mat& W_o,
-                                Cache& c) const {
+                                const Mat& table, Cache& c) const {
   const Index B = s.cols(), h = layer1.W.value.rows();
   if (scalar_) {  // column b K + k: sample b, option k
     c.state.resize(h, B);
     c.h0.resize(h, K_ * B);
     layer0.MultiplyState(s, c.state);
     for (Index b = 0; b < B; ++b) {
-      c.h0.middleCols(b * K_, K_) = (table_.colwise() + c.state.col(b)).cwiseMax(0);
+      c.h0.middleCols(b * K_, K_) = (table.colwise() + c.state.col(b)).cwiseMax(0);
     }
   } else {
     c.input.resize(s.rows() + W_o.rows(), B);
@@ -296,11 +303,12 @@ void OptionValueNet::ForwardAll(const ConstMatRef& s, std::span<const int> o, co
   ForwardHead(c);
 }
 
-void OptionValueNet::ForwardOne(const ConstMatRef& s, std::span<const int> o, Cache& c) const {
+void OptionValueNet::ForwardOne(const ConstMatRef& s, std::span<const int> o, const Mat& table,
+                                Cache& c) const {
   c.h0.resize(layer1.W.value.rows(), s.cols());
   c.q.resize(1, s.cols());
   layer0.MultiplyState(s, c.h0);
-  AddTableRelu(table_, o, c.h0);
+  AddTableRelu(table, o, c.h0);
   ForwardHead(c);
 }
 
@@ -320,19 +328,19 @@ void OptionValueNet::Backward(const ConstMatRef& s, std::span<const int> o, cons
     BackwardNormalized(norm, layer0_full, c.norm, c.dh0, c.G, c.db);
     return;
   }
-  dtable_.setZero(h, K_);
+  c.dtable.setZero(h, K_);
   if (c.q.rows() == 1) {
     layer0.AddStateGrad(s, c.dh0);
-    ScatterColumns(c.dh0, o, dtable_);
+    ScatterColumns(c.dh0, o, c.dtable);
   } else {
     for (Index b = 0; b < B; ++b) {
       const auto options = c.dh0.middleCols(b * K_, K_);
-      dtable_ += options;
+      c.dtable += options;
       c.state.col(b) = options.rowwise().sum();
     }
     layer0.AddStateGrad(s, c.state);
   }
-  layer0.AddTableGrad(W_o, dtable_, nullptr);  // o_hat is detached
+  layer0.AddTableGrad(W_o, c.dtable, nullptr);  // o_hat is detached
 }
 
 }  // namespace o2v

@@ -52,29 +52,35 @@ struct OptionPolicyNet {
     AttentionBlock::Cache block;
     std::vector<int> init_rows;  // samples with the initial flag; they fill the first columns of
     Mat init_s, init_hidden, init_z, init_dz, init_dhidden;  // these, which are B wide
+    Mat dtable;  // (D, K) adjoint of the table of `query`
   };
 
   OptionPolicyNet() = default;
   OptionPolicyNet(const Option2VecSizes& sizes, const Form& form, const Initialiser& init);
 
-  /// Makes what follows from the weights alone; needed before Forward whenever they have changed.
-  void MakeTables();
+  /// What follows from the weights alone, made once while they stand.
+  struct Tables {
+    MemoryAttention::Memory memory;
+    Mat query;  // (D, K) of `query`
+  };
+
+  void Tabulate(Tables& tables) const;
   /// s (S, B), o_prev, init (B) -> c.log_P, c.P (K, B). masks null: no dropout.
   void Forward(const ConstMatRef& s, std::span<const int> o_prev, std::span<const char> init,
-               const AttentionBlock::Masks* masks, Cache& c) const;
+               const Tables& tables, const AttentionBlock::Masks* masks, Cache& c) const;
   /// From c.dz; same arguments as Forward. Adds to the gradients.
-  void Backward(const ConstMatRef& s, std::span<const int> o_prev,
+  void Backward(const ConstMatRef& s, std::span<const int> o_prev, const Tables& tables,
                 const AttentionBlock::Masks* masks, Cache& c);
 
   Index Tokens() const { return form_.two_tokens ? 2 : 1; }
   std::vector<Param*> Params();
+  /// Those of the initial net.
+  std::vector<Param*> InitParams();
 
  private:
   void BackwardInitial(Cache& c);
 
   Form form_{};
-  MemoryAttention::Memory memory_;
-  Mat table_, dtable_;  // (D, K) of `query`
 };
 
 /// Action policy pi_a(a | s, o) = N(mu, sigma^2): mu = tanh(.), sigma = softplus(.) of a ReLU body
@@ -87,26 +93,25 @@ struct ActionPolicyNet {
     Mat h0, h1, dh0, dh1;  // (h, B)
     Mat mu, sigma;         // (A, B)
     Mat dmu, dsigma;       // (A, B) their adjoints: the input of Backward, overwritten
+    Mat dtable;            // (h, K)
   };
 
   ActionPolicyNet() = default;
   ActionPolicyNet(const Option2VecSizes& sizes, const Initialiser& init);
 
-  /// W_o (D, K). Needed before Forward whenever the weights have changed.
-  void MakeTable(const Mat& W_o) { layer0.MakeTable(W_o, table_); }
+  /// W_o (D, K) -> table (h, K), which follows from the weights alone.
+  void Tabulate(const Mat& W_o, Mat& table) const { layer0.MakeTable(W_o, table); }
   /// s (S, B), o (B) -> c.mu, c.sigma.
-  void Forward(const ConstMatRef& s, std::span<const int> o, Cache& c) const;
+  void Forward(const ConstMatRef& s, std::span<const int> o, const Mat& table, Cache& c) const;
   /// From c.dmu, c.dsigma. Adds to the gradients.
   void Backward(const ConstMatRef& s, std::span<const int> o, const Mat& W_o, Cache& c);
   /// s (S, B), o (B) -> J (A, D), mean over the samples of
   ///   d mu / d o_hat = diag(1 - mu^2) W_mu diag(h1 > 0) W_1 diag(h0 > 0) W_e,
   /// W_e the part of W_0 that multiplies o_hat; 0 is the derivative at a ReLU's kink. Runs Forward.
-  void MeanJacobian(const ConstMatRef& s, std::span<const int> o, Cache& c, MatD& J) const;
+  void MeanJacobian(const ConstMatRef& s, std::span<const int> o, const Mat& table, Cache& c,
+                    MatD& J) const;
 
   std::vector<Param*> Params();
-
- private:
-  Mat table_, dtable_;  // (h, K) of layer0
 };
 
 /// Option value, a ReLU body on [s, o_hat], o_hat detached.
@@ -129,18 +134,21 @@ struct OptionValueNet {
     Mat dq;                // its adjoint: the input of Backward
     Mat G;                 // (h, S + D) scratch
     Vec db;                // (h)
+    Mat dtable;            // (h, K)
   };
 
   OptionValueNet() = default;
   OptionValueNet(const Option2VecSizes& sizes, bool scalar, const Initialiser& init);
 
-  void MakeTable(const Mat& W_o) {
-    if (scalar_) layer0.MakeTable(W_o, table_);
+  /// W_o (D, K) -> table (h, K), which follows from the weights alone. Scalar form only.
+  void Tabulate(const Mat& W_o, Mat& table) const {
+    if (scalar_) layer0.MakeTable(W_o, table);
   }
   /// s (S, B), o (B) the option fed (K outputs only) -> c.q (K, B).
-  void ForwardAll(const ConstMatRef& s, std::span<const int> o, const Mat& W_o, Cache& c) const;
+  void ForwardAll(const ConstMatRef& s, std::span<const int> o, const Mat& W_o, const Mat& table,
+                  Cache& c) const;
   /// s (S, B), o (B) -> c.q (1, B) = Q_O[s, o]. Scalar form only.
-  void ForwardOne(const ConstMatRef& s, std::span<const int> o, Cache& c) const;
+  void ForwardOne(const ConstMatRef& s, std::span<const int> o, const Mat& table, Cache& c) const;
   /// From c.dq, shaped as c.q of the forward pass before. Adds to the gradients.
   void Backward(const ConstMatRef& s, std::span<const int> o, const Mat& W_o, Cache& c);
 
@@ -151,7 +159,6 @@ struct OptionValueNet {
 
   bool scalar_ = true;
   Index K_ = 0;
-  Mat table_, dtable_;  // (h, K) of layer0
 };
 
 }  // namespace o2v

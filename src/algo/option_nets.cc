@@ -100,48 +100,57 @@ void OptionBank::Backward(const ConstMatRef& s, Cache& c) {
   }
 }
 
+std::vector<Param*> OptionBank::Params() {
+  std::vector<Param*> params;
+  for (Net& net : nets_) Append(params, net.Params());
+  return params;
+}
+
 // ---- Intra-option policies ----------------------------------------------------------------------
 
 OptionPolicies::OptionPolicies(Index K, Index S, Index A, Index h, Activation activation,
                                const Initialiser& init)
-    : mu_("mu", K, S, h, A, activation, init), sigma_(A, K), dsigma_(A, K) {
+    : mu_("mu", K, S, h, A, activation, init) {
   for (Index k = 0; k < K; ++k) rho_.emplace_back(OptionName(k, "rho"), A, 1);
 }
 
-void OptionPolicies::MakeSigma() {
-  for (std::size_t k = 0; k < rho_.size(); ++k) sigma_.col(Index(k)) = rho_[k].value.col(0);
-  Softplus(sigma_);
+void OptionPolicies::MakeSigma(Cache& c) const {
+  c.sigma_of.resize(rho_[0].value.rows(), Index(rho_.size()));
+  for (std::size_t k = 0; k < rho_.size(); ++k) c.sigma_of.col(Index(k)) = rho_[k].value.col(0);
+  Softplus(c.sigma_of);
 }
 
 void OptionPolicies::ForwardOne(const ConstMatRef& s, std::span<const int> o, Cache& c) const {
   mu_.ForwardOne(s, o, c.nets);
   Tanh(c.nets.out);
-  c.sigma.resize(sigma_.rows(), s.cols());
-  GatherColumns(sigma_, o, c.sigma);
+  MakeSigma(c);
+  c.sigma.resize(c.sigma_of.rows(), s.cols());
+  GatherColumns(c.sigma_of, o, c.sigma);
 }
 
 void OptionPolicies::ForwardAll(const ConstMatRef& s, Cache& c) const {
   mu_.ForwardAll(s, c.nets);
   Tanh(c.nets.out);
-  c.sigma.resize(sigma_.rows(), c.nets.out.cols());
-  for (Index k = 0; k < sigma_.cols(); ++k) {
-    c.sigma.middleCols(k * s.cols(), s.cols()).colwise() = sigma_.col(k);
+  MakeSigma(c);
+  c.sigma.resize(c.sigma_of.rows(), c.nets.out.cols());
+  for (Index k = 0; k < c.sigma_of.cols(); ++k) {
+    c.sigma.middleCols(k * s.cols(), s.cols()).colwise() = c.sigma_of.col(k);
   }
 }
 
 void OptionPolicies::Backward(const ConstMatRef& s, std::span<const int> o, Cache& c) {
   ActivationBackward(Activation::kTanh, c.nets.out, c.nets.dout);
   mu_.Backward(s, c.nets);
-  dsigma_.setZero();
+  c.dsigma_of.setZero(c.sigma_of.rows(), c.sigma_of.cols());
   if (c.nets.all) {
-    for (Index k = 0; k < sigma_.cols(); ++k) {
-      dsigma_.col(k) = c.dsigma.middleCols(k * s.cols(), s.cols()).rowwise().sum();
+    for (Index k = 0; k < c.sigma_of.cols(); ++k) {
+      c.dsigma_of.col(k) = c.dsigma.middleCols(k * s.cols(), s.cols()).rowwise().sum();
     }
   } else {
-    ScatterColumns(c.dsigma, o, dsigma_);
+    ScatterColumns(c.dsigma, o, c.dsigma_of);
   }
-  SoftplusBackward(sigma_, dsigma_);
-  for (std::size_t k = 0; k < rho_.size(); ++k) rho_[k].grad.col(0) += dsigma_.col(Index(k));
+  SoftplusBackward(c.sigma_of, c.dsigma_of);
+  for (std::size_t k = 0; k < rho_.size(); ++k) rho_[k].grad.col(0) += c.dsigma_of.col(Index(k));
 }
 
 std::vector<Param*> OptionPolicies::Params(Index k) {
@@ -201,6 +210,12 @@ void OptionNets::CallAndReturn(const ConstMatRef& s, std::span<const int> o_prev
   c.M.resize(pi.rows(), pi.cols());
   OneHot(o_prev, c.M);
   o2v::CallAndReturn(pi, c.beta.beta, c.M, o_prev, init, beta_index, c.pi_hat);
+}
+
+std::vector<Param*> OptionNets::UsedParams() {
+  std::vector<Param*> used = Params();
+  for (const Param* idle : idle_head.Params()) std::erase(used, idle);
+  return used;
 }
 
 std::vector<Param*> OptionNets::Params() {

@@ -39,6 +39,8 @@ class OptionBank {
 
   Index K() const { return Index(nets_.size()); }
   Net& operator[](Index k) { return nets_[std::size_t(k)]; }
+  /// Option after option.
+  std::vector<Param*> Params();
 
  private:
   void Forward(const ConstMatRef& s, Cache& cache) const;
@@ -51,16 +53,15 @@ class OptionBank {
 class OptionPolicies {
  public:
   struct Cache {
-    OptionBank::Cache nets;  // nets.out is mu after its tanh, nets.dout its adjoint
-    Mat sigma, dsigma;       // (A, n), column by column as nets.out
+    OptionBank::Cache nets;   // nets.out is mu after its tanh, nets.dout its adjoint
+    Mat sigma, dsigma;        // (A, n), column by column as nets.out
+    Mat sigma_of, dsigma_of;  // (A, K) sigma_k of every option; its adjoint
   };
 
   OptionPolicies() = default;
   OptionPolicies(Index K, Index S, Index A, Index h, Activation activation,
                  const Initialiser& init);
 
-  /// sigma_k of all options; needed before the forward passes whenever rho has changed.
-  void MakeSigma();
   /// s (S, B), o (B) -> mu, sigma (A, B) of the options o.
   void ForwardOne(const ConstMatRef& s, std::span<const int> o, Cache& cache) const;
   /// s (S, B) -> mu, sigma (A, K B) of all options, option after option.
@@ -69,14 +70,14 @@ class OptionPolicies {
   /// to ForwardOne; empty after ForwardAll.
   void Backward(const ConstMatRef& s, std::span<const int> o, Cache& cache);
 
-  const Mat& sigma() const { return sigma_; }  // (A, K)
   /// Parameters of option k.
   std::vector<Param*> Params(Index k);
 
  private:
+  void MakeSigma(Cache& cache) const;
+
   OptionBank mu_;
   std::vector<Param> rho_;  // (A, 1) each
-  Mat sigma_, dsigma_;      // (A, K)
 };
 
 /// The network of PPOC, OC, AHP+PPO, IOPG and DAC+PPO: master policy, critic, and of each option an
@@ -119,7 +120,9 @@ struct OptionNets {
   void CallAndReturn(const ConstMatRef& s, std::span<const int> o_prev, std::span<const char> init,
                      const Mat& pi, Fidelity beta_index, Process& c) const;
 
+  /// All in the order of the network; those without the idle head.
   std::vector<Param*> Params();
+  std::vector<Param*> UsedParams();
 };
 
 }  // namespace o2v

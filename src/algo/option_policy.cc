@@ -67,6 +67,17 @@ void SoftmaxBackward(const Mat& p, const Mat& dp, Mat& dz) {
   }
 }
 
+void PickRows(const Mat& log_p, std::span<const int> o, Vec& logp) {
+  logp.resize(log_p.cols());
+  for (Index b = 0; b < log_p.cols(); ++b) logp(b) = log_p(o[std::size_t(b)], b);
+}
+
+double MeanEntropy(const Mat& p, const Mat& log_p) {
+  double sum = 0;
+  for (Index i = 0; i < p.size(); ++i) sum -= double(p.data()[i] * log_p.data()[i]);
+  return sum / double(p.cols());
+}
+
 Real OptionLog::Log(Real p) const {
   return eps_ ? std::log(p + Real(kLogEps)) : std::log(std::max(p, kFloor));
 }
@@ -76,17 +87,9 @@ Real OptionLog::Slope(Real p) const {
   return p < kFloor ? 0 : 1 / p;
 }
 
-void OptionLog::LogProb(const Mat& p, std::span<const int> o, Vec& logp) const {
-  logp.resize(p.cols());
-  for (Index b = 0; b < p.cols(); ++b) logp(b) = Log(p(o[std::size_t(b)], b));
-}
-
-double OptionLog::MeanEntropy(const Mat& p) const {
-  double sum = 0;
-  for (Index b = 0; b < p.cols(); ++b) {
-    for (Index k = 0; k < p.rows(); ++k) sum -= double(p(k, b) * Log(p(k, b)));
-  }
-  return sum / double(p.cols());
+void OptionLog::Log(const Mat& p, Mat& log_p) const {
+  log_p.resize(p.rows(), p.cols());
+  for (Index i = 0; i < p.size(); ++i) log_p.data()[i] = Log(p.data()[i]);
 }
 
 void OptionLog::Backward(const Mat& p, std::span<const int> o, const Vec& dlogp, double dH,

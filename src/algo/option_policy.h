@@ -30,6 +30,11 @@ void CallAndReturnBackward(const Mat& G, const Mat& pi, const Mat& beta, const M
                            std::span<const int> o_prev, std::span<const char> init,
                            Fidelity beta_index, Mat& dz, Mat& db);
 
+/// log_p (K, B), o (B) -> logp (B), the entries o_b.
+void PickRows(const Mat& log_p, std::span<const int> o, Vec& logp);
+/// Mean over the batch of H = -sum_k p_k ln p_k; p, log_p (K, B).
+double MeanEntropy(const Mat& p, const Mat& log_p);
+
 /// dp = dL/dp of p = softmax(z) (K, B) -> dz_j = p_j (dp_j - sum_k p_k dp_k). Source: spec 3.4.
 void SoftmaxBackward(const Mat& p, const Mat& dp, Mat& dz);
 
@@ -39,11 +44,10 @@ class OptionLog {
  public:
   explicit OptionLog(Fidelity density_log_eps) : eps_(density_log_eps != Fidelity::kPaper) {}
 
-  /// p (K, B), o (B) -> logp (B) of p[o_b].
-  void LogProb(const Mat& p, std::span<const int> o, Vec& logp) const;
-  /// Mean over the batch of H = -sum_k p_k ln p_k.
-  double MeanEntropy(const Mat& p) const;
-  /// Adjoint of p: dlogp (B) through LogProb and dH through MeanEntropy -> dp (K, B), overwritten.
+  /// p (K, B) -> log_p (K, B).
+  void Log(const Mat& p, Mat& log_p) const;
+  /// Adjoint of p: dlogp (B) through ln p[o_b] and dH through the mean entropy -> dp (K, B),
+  /// overwritten.
   void Backward(const Mat& p, std::span<const int> o, const Vec& dlogp, double dH, Mat& dp) const;
 
  private:

@@ -1,5 +1,4 @@
-#include "algo/method.h"
-#include "algo/ppo_core.h"
+#include "algo/ppo_method.h"
 #include "dist/diag_gaussian.h"
 
 namespace o2v {
@@ -12,18 +11,19 @@ namespace {
 ///   L = clip-surrogate(ln N(a; mu, sigma), old, A_hat) - w mean H + 1/2 mean (v - R)^2
 ///
 /// Source: spec 2.2, 4.1; Schulman et al. 2017.
-class Ppo final : public Method {
+class Ppo final : public PpoMethod {
  public:
   explicit Ppo(const AlgorithmInput& in);
 
-  void Collect(VecEnv& env, std::vector<Episode>& episodes) override;
-  const std::vector<Ratio>& Update() override;
   void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
                     Mat& P) override;
   void ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, Mat& sigma) override;
   LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) override;
 
  private:
+  void Act(const Mat& s, std::span<const char> init, Index row) override;
+  void Values(const Choices& x, Index row) override;
+
   struct Cache {
     Net::Cache actor, critic;  // the actor's output is mu (A, B)
     Mat dsigma;                // (A, 1)
@@ -36,21 +36,17 @@ class Ppo final : public Method {
 
   const double clip_;            // c
   const double entropy_weight_;  // w
-  Rng &policy_rng_ = NewStream("policy"), &shuffle_rng_ = NewStream("shuffle");
-
   Net actor_, critic_net_;
   Param rho_;  // (A, 1)
   Mat sigma_;  // (A, 1)
-  PpoRollout rollout_;
   CacheByWidth<Cache> caches_;
 };
 
 Ppo::Ppo(const AlgorithmInput& in)
-    : Method(in, /*K=*/0),
+    : PpoMethod(in, /*K=*/0),
       clip_(in.hyper->Real("ratio_clip")),
       entropy_weight_(in.hyper->Real("entropy_weight")),
-      rho_("actor.rho", in.A, 1),
-      rollout_(in, /*critics=*/1) {
+      rho_("actor.rho", in.A, 1) {
   const Index h = in.hyper->Int("hidden", 1);
   const Activation g = ReadActivation(*in.hyper);
   actor_ = Net("actor.body", "actor.head", in.S, h, in.A, g, init_);
@@ -58,8 +54,7 @@ Ppo::Ppo(const AlgorithmInput& in)
   std::vector<Param*> params = actor_.Params();
   params.push_back(&rho_);
   Append(params, critic_net_.Params());
-  const auto reached = [](const std::string&) { return true; };
-  Assemble(in, std::move(params), {reached}, nullptr, &critic_net_);
+  RegisterNetworks(in, params, {params}, nullptr, &critic_net_);
 }
 
 void Ppo::MakeSigma() {
@@ -72,26 +67,20 @@ void Ppo::Actor(const ConstMatRef& s, Cache& c) const {
   Tanh(c.actor.out);
 }
 
-void Ppo::Collect(VecEnv& env, std::vector<Episode>& episodes) {
-  MakeSigma();
+void Ppo::Act(const Mat& s, std::span<const char>, Index row) {
   Cache& c = caches_(N_);
-  Batch& batch = rollout_.batch;
-  const auto act = [&](Index row) {
-    Actor(env.States(), c);
-    SampleGaussian(c.actor.out, sigma_, policy_rng_, rollout_.a);
-    GaussianLogProb(rollout_.a, c.actor.out, sigma_, c.logp);
-    batch.low.logp_old.segment(row, N_) = c.logp;
-  };
-  // v of the states s, from `row` on.
-  const auto value = [&](const ConstMatRef& s, Index row) {
-    Net::Cache& critic = caches_(s.cols()).critic;
-    critic_net_.Forward(s, critic);
-    Eigen::Map<VecD>(rollout_.critics[0].v.data() + row, s.cols()) =
-        critic.out.row(0).transpose().cast<double>();
-  };
-  rollout_.Collect(
-      env, episodes, act, [&](Index row, Index n) { value(batch.s.middleCols(row, n), row); },
-      [&](const Mat& s, std::span<const char>) { value(s, batch.Size()); });
+  MakeSigma();
+  Actor(s, c);
+  SampleGaussian(c.actor.out, sigma_, policy_rng_, a_);
+  GaussianLogProb(a_, c.actor.out, sigma_, c.logp);
+  rollout_.batch.low.logp_old.segment(row, N_) = c.logp;
+}
+
+void Ppo::Values(const Choices& x, Index row) {
+  Net::Cache& critic = caches_(x.s.cols()).critic;
+  critic_net_.Forward(x.s, critic);
+  Eigen::Map<VecD>(rollout_.critics[0].v.data() + row, x.s.cols()) =
+      critic.out.row(0).transpose().cast<double>();
 }
 
 LossTerms Ppo::Loss(int, const Batch& batch, const FixedDraws*) {
@@ -119,11 +108,6 @@ LossTerms Ppo::Loss(int, const Batch& batch, const FixedDraws*) {
 
   terms.total = terms.surrogate - entropy_weight_ * terms.entropy + terms.value;
   return terms;
-}
-
-const std::vector<Ratio>& Ppo::Update() {
-  rollout_.ForEpochs(shuffle_rng_, [&](const Batch& batch) { Learn(0, batch); });
-  return Report();
 }
 
 void Ppo::OptionPolicy(const Mat& s, const std::vector<int>&, const std::vector<char>&, Mat& P) {

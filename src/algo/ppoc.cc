@@ -1,9 +1,8 @@
 #include <algorithm>
 #include <limits>
 
-#include "algo/method.h"
 #include "algo/option_policy.h"
-#include "algo/ppo_core.h"
+#include "algo/ppo_method.h"
 #include "dist/categorical.h"
 
 namespace o2v {
@@ -20,17 +19,19 @@ namespace {
 /// omega: with `ppoc_master_weight` = paper the posterior beta_{o'} pi_o / pi_hat_o that the master
 /// chose o (1 at first states), constant in the gradient; released 1. Source: spec 4.2; Klissarov
 /// et al. 2017.
-class Ppoc final : public Method {
+class Ppoc final : public PpoMethod {
  public:
   explicit Ppoc(const AlgorithmInput& in);
 
-  void Collect(VecEnv& env, std::vector<Episode>& episodes) override;
-  const std::vector<Ratio>& Update() override;
   void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
                     Mat& P) override;
   LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) override;
 
  private:
+  void Act(const Mat& s, std::span<const char> init, Index row) override;
+  Choices Imagine(const Mat& s, std::span<const char> init) override;
+  void Values(const Choices& x, Index row) override;
+
   struct Cache {
     OptionNets::Process options;
     OptionNets::BetaCache beta_taken;  // of o
@@ -50,23 +51,19 @@ class Ppoc final : public Method {
 
   const double clip_;  // c
   const Real w_, eta_;
-  Rng &policy_rng_ = NewStream("policy"), &bootstrap_rng_ = NewStream("bootstrap"),
-      &shuffle_rng_ = NewStream("shuffle");
+  Rng& bootstrap_rng_ = NewStream("bootstrap");
   OptionNets nets_;
-  PpoRollout rollout_;
   CacheByWidth<Cache> caches_;
 };
 
 Ppoc::Ppoc(const AlgorithmInput& in)
-    : Method(in, in.hyper->Int("options", 1), {"all"},
-             {{"termination", &LossTerms::termination}, {"master", &LossTerms::master}}),
+    : PpoMethod(in, in.hyper->Int("options", 1), {"all"},
+                {{"termination", &LossTerms::termination}, {"master", &LossTerms::master}}),
       clip_(in.hyper->Real("ratio_clip")),
       w_(Real(in.hyper->Real("entropy_weight"))),
-      eta_(Real(in.hyper->Real("termination_penalty"))),
-      rollout_(in, /*critics=*/1) {
+      eta_(Real(in.hyper->Real("termination_penalty"))) {
   nets_ = MakeOptionNets(in, OptionNets::CriticHead::kQ, init_);
-  const auto reached = [](const std::string& name) { return !name.starts_with("critic.u."); };
-  Assemble(in, nets_.Params(), {reached}, &nets_.policy, &nets_.critic);
+  RegisterNetworks(in, nets_.Params(), {nets_.UsedParams()}, &nets_.policy, &nets_.critic);
   o_prev_.assign(std::size_t(N_), 0);
 }
 
@@ -78,32 +75,29 @@ const Mat& Ppoc::PiHat(const ConstMatRef& s, std::span<const int> o_prev,
   return c.pi_hat;
 }
 
-void Ppoc::Collect(VecEnv& env, std::vector<Episode>& episodes) {
-  nets_.policy.MakeSigma();
-  Batch& batch = rollout_.batch;
+void Ppoc::Act(const Mat& s, std::span<const char> init, Index row) {
   Cache& c = caches_(N_);
   c.o.resize(std::size_t(N_));
-  const auto act = [&](Index row) {
-    const Mat& s = env.States();
-    SampleCategorical(PiHat(s, o_prev_, env.Init()), policy_rng_, c.o);
-    SampleAction(nets_.policy, s, c.o, policy_rng_, rollout_.a, c.action);
-    LogDensity(switches_.density_log_eps, c.action.logp, c.action.slope);
-    batch.low.logp_old.segment(row, N_) = c.action.logp;
-    RecordOptions(row, c.o, env.Init(), batch);
-  };
-  // v = q_o of the states s, from `row` on.
-  const auto value = [&](const ConstMatRef& s, std::span<const int> o, Index row) {
-    EntryValues(nets_.critic, s, o, caches_(s.cols()).value.critic,
-                rollout_.critics[0].v.data() + row);
-  };
-  rollout_.Collect(
-      env, episodes, act,
-      [&](Index row, Index n) { value(batch.s.middleCols(row, n), Rows(batch.o, row, n), row); },
-      [&](const Mat& s, std::span<const char> init) {
-        // The option o ~ pi_hat(. | s, o_{t-1}) that is drawn here is thrown away; spec 1.3.
-        SampleCategorical(PiHat(s, o_prev_, init), bootstrap_rng_, c.o);
-        value(s, c.o, batch.Size());
-      });
+  SampleCategorical(PiHat(s, o_prev_, init), policy_rng_, c.o);
+  SampleAction(nets_.policy, s, c.o, policy_rng_, a_, c.action);
+  LogDensity(switches_.density_log_eps, c.action.logp, c.action.slope);
+  rollout_.batch.low.logp_old.segment(row, N_) = c.action.logp;
+  RecordOptions(row, c.o, init, rollout_.batch);
+}
+
+/// o ~ pi_hat(. | s, o').
+Choices Ppoc::Imagine(const Mat& s, std::span<const char> init) {
+  Choices x = PpoMethod::Imagine(s, init);
+  Cache& c = caches_(N_);
+  SampleCategorical(PiHat(s, o_prev_, init), bootstrap_rng_, c.o);
+  x.o = c.o;
+  return x;
+}
+
+/// v = q_o.
+void Ppoc::Values(const Choices& x, Index row) {
+  EntryValues(nets_.critic, x.s, x.o, caches_(x.s.cols()).value.critic,
+              rollout_.critics[0].v.data() + row);
 }
 
 LossTerms Ppoc::Loss(int, const Batch& batch, const FixedDraws*) {
@@ -173,11 +167,6 @@ void Ppoc::MasterWeight(const Batch& batch, Cache& c) const {
     // Against 0 / 0 where terminations saturate.
     c.omega(b) = stop * pi / std::max(pi_hat, std::numeric_limits<Real>::min());
   }
-}
-
-const std::vector<Ratio>& Ppoc::Update() {
-  rollout_.ForEpochs(shuffle_rng_, [&](const Batch& batch) { Learn(0, batch); });
-  return Report();
 }
 
 void Ppoc::OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,

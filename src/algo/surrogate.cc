@@ -49,8 +49,7 @@ void SampleAction(const OptionPolicies& policy, const ConstMatRef& s, std::span<
   GaussianLogProb(a, c.policy.nets.out, c.policy.sigma, c.logp);
 }
 
-void ActionLogProb(OptionPolicies& policy, const Batch& batch, ActionCache& c) {
-  policy.MakeSigma();
+void ActionLogProb(const OptionPolicies& policy, const Batch& batch, ActionCache& c) {
   policy.ForwardOne(batch.s, batch.o, c.policy);
   GaussianLogProb(batch.a, c.policy.nets.out, c.policy.sigma, c.logp);
 }

@@ -30,12 +30,12 @@ struct ActionCache {
   Vec logp, dlogp, slope;  // (B) ln pi_o(a | s), its adjoint, its slope under density_log_eps
 };
 
-/// s (S, N), o (N) -> a (A, N) ~ pi_o and c.logp. The sigmas have been made.
+/// s (S, N), o (N) -> a (A, N) ~ pi_o and c.logp.
 void SampleAction(const OptionPolicies& policy, const ConstMatRef& s, std::span<const int> o,
                   Rng& rng, Mat& a, ActionCache& c);
 
-/// The sigmas and c.logp of a batch.
-void ActionLogProb(OptionPolicies& policy, const Batch& batch, ActionCache& c);
+/// c.logp of a batch.
+void ActionLogProb(const OptionPolicies& policy, const Batch& batch, ActionCache& c);
 
 /// Clipped surrogate of the density e^{c.logp} on batch.low under density_log_eps. c.logp is what
 /// ActionLogProb left, with the logarithms of other factors added or not; c.dlogp becomes its

@@ -40,6 +40,7 @@ struct Dropping {
   Option2VecSizes sizes{.S = 1, .A = 1, .K = 4, .D = 6, .F = 7, .heads = 1, .h = 8, .h_init = 16};
   OptionPolicyNet net{
       sizes, {.two_tokens = true, .init_relu = true, .prev_embed_grad = false}, Initialiser()};
+  OptionPolicyNet::Tables tables;
   OptionPolicyNet::Cache c;
 
   Dropping() {
@@ -47,7 +48,7 @@ struct Dropping {
     for (Param* p : algorithm->Params())
       p->value = RandomMat(p->value.rows(), p->value.cols(), rng);
     for (Param* p : net.Params()) p->value = FindParam(*algorithm, p->name).value;
-    net.MakeTables();
+    net.Tabulate(tables);
   }
 };
 
@@ -70,7 +71,7 @@ TEST(Option2Vec, ActsThroughFreshMasksOfItsProbability) {
   Mat mu, sigma, a;
   for (int t = 0; t < on.config.hyper.Int("rollout"); ++t) {
     draw();
-    on.net.Forward(own.States(), o, own.Init(), &on.c.masks, on.c);
+    on.net.Forward(own.States(), o, own.Init(), on.tables, &on.c.masks, on.c);
     SampleCategorical(on.c.P, policy, o);
     on.algorithm->ActionPolicy(own.States(), o, mu, sigma);
     SampleGaussian(mu, sigma, policy, a);
@@ -90,7 +91,7 @@ TEST(Option2Vec, IsAskedWithoutDropout) {
   const std::vector<int> o_prev = RandomOptions(30, 4, rng);
   std::vector<char> init(30, 0);
   init[3] = init[8] = 1;
-  on.net.Forward(s, o_prev, init, nullptr, on.c);
+  on.net.Forward(s, o_prev, init, on.tables, nullptr, on.c);
   Mat P;
   on.algorithm->OptionPolicy(s, o_prev, init, P);
   EXPECT_LT((P - on.c.P).cwiseAbs().maxCoeff(), 1e-6);

@@ -54,7 +54,6 @@ struct Episode4 {
     nets.master.Forward(batch.s, master);
     LogSoftmax(master.out, log_pi, pi);
     nets.Beta(batch.s, {}, /*all=*/true, beta);
-    nets.policy.MakeSigma();
     MatD p(K, kSteps);
     for (int k = 0; k < K; ++k) {
       Vec logp;

@@ -23,7 +23,6 @@ struct OnSamples {
     for (Param* p : nets.Params()) {
       p->value += RandomMat(p->value.rows(), p->value.cols(), rng, 0.3);
     }
-    nets.policy.MakeSigma();
   }
   /// The gradients so far, which are put back to zero.
   std::vector<Mat> TakeGradients() {

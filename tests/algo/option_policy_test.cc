@@ -76,13 +76,20 @@ TEST(OneHot, MarksOneRowAColumn) {
   EXPECT_EQ(M, (Mat(3, 2) << 0, 1, 0, 0, 1, 0).finished());
 }
 
+TEST(PickRows, TakesTheEntryOfEachColumnsOption) {
+  const Mat log_p = (Mat(3, 2) << 1, 2, 3, 4, 5, 6).finished();
+  Vec logp;
+  PickRows(log_p, std::vector<int>{2, 0}, logp);
+  EXPECT_EQ(logp, (Vec(2) << 5, 2).finished());
+}
+
 TEST(OptionLog, IsTheLogarithmInPaper) {
   const OptionLog log(Fidelity::kPaper);
   const std::vector<int> o = {0};
-  Vec logp;
-  log.LogProb(Column({0.25, 0.75}), o, logp);
-  EXPECT_NEAR(logp(0), std::log(0.25), kTolerance);
-  EXPECT_NEAR(log.MeanEntropy(Column({0.5, 0.5})), std::log(2.0), kTolerance);
+  Mat log_p;
+  log.Log(Column({0.25, 0.75}), log_p);
+  EXPECT_NEAR(log_p(0, 0), std::log(0.25), kTolerance);
+  EXPECT_NEAR(log_p(1, 0), std::log(0.75), kTolerance);
   Mat dp;
   log.Backward(Column({0.25, 0.75}), o, Vec::Constant(1, 2), /*dH=*/-1, dp);
   ExpectNear(dp, Column({2 / 0.25 + std::log(0.25) + 1, std::log(0.75) + 1}));
@@ -91,10 +98,10 @@ TEST(OptionLog, IsTheLogarithmInPaper) {
 TEST(OptionLog, IsConstantBelowItsFloorInPaper) {
   const OptionLog log(Fidelity::kPaper);
   const std::vector<int> o = {0};
-  Vec logp;
-  log.LogProb(Column({0, 1}), o, logp);
-  EXPECT_NEAR(logp(0), std::log(1e-12), 1e-5);
-  EXPECT_EQ(log.MeanEntropy(Column({0, 1})), 0);
+  Mat log_p;
+  log.Log(Column({0, 1}), log_p);
+  EXPECT_NEAR(log_p(0, 0), std::log(1e-12), 1e-5);
+  EXPECT_EQ(MeanEntropy(Column({0, 1}), log_p), 0);
   Mat dp;
   log.Backward(Column({0, 1}), o, Vec::Constant(1, 2), /*dH=*/0, dp);
   EXPECT_EQ(dp, Column({0, 0}));
@@ -103,9 +110,9 @@ TEST(OptionLog, IsConstantBelowItsFloorInPaper) {
 TEST(OptionLog, AddsEpsilonInReleased) {
   const OptionLog log(Fidelity::kReleased);
   const std::vector<int> o = {0};
-  Vec logp;
-  log.LogProb(Column({1e-5, 0.9}), o, logp);
-  EXPECT_NEAR(logp(0), std::log(2e-5), kTolerance);
+  Mat log_p;
+  log.Log(Column({1e-5, 0.9}), log_p);
+  EXPECT_NEAR(log_p(0, 0), std::log(2e-5), kTolerance);
   Mat dp;  // not a distribution: nothing asks for one
   log.Backward(Column({1e-5, 0.9}), o, Vec::Constant(1, Real(1e-5)), /*dH=*/-1, dp);
   // slope 1 / 2e-5: 1e-5 / 2e-5 + ln 2e-5 + 1e-5 / 2e-5
@@ -115,7 +122,9 @@ TEST(OptionLog, AddsEpsilonInReleased) {
 TEST(OptionLog, AveragesTheEntropy) {
   const OptionLog log(Fidelity::kPaper);
   const Mat p = (Mat(2, 2) << 0.5, 1, 0.5, 0).finished();
-  EXPECT_NEAR(log.MeanEntropy(p), std::log(2.0) / 2, kTolerance);
+  Mat log_p;
+  log.Log(p, log_p);
+  EXPECT_NEAR(MeanEntropy(p, log_p), std::log(2.0) / 2, kTolerance);
   Mat dp;
   log.Backward(p, std::vector<int>{0, 0}, Vec::Zero(2), /*dH=*/2, dp);
   EXPECT_NEAR(dp(0, 0), -(std::log(0.5) + 1), kTolerance);
