@@ -377,7 +377,7 @@ double AdamEntriesPerStep(const RunConfig& config, int S, int A, double episode_
   const bool idle_move = config.switches.adam_idle == Fidelity::kReleased;
   const std::vector<char> used = InAnyGraph(*algorithm);
   double entries = 0;  // in a step of each stage
-  for (int stage = 0; stage < int(algorithm->Stages().size()); ++stage) {
+  for (int stage = 0; stage < int(algorithm->StageNames().size()); ++stage) {
     const std::vector<char> in_graph = idle_move ? used : algorithm->InGraph(stage);
     for (std::size_t i = 0; i < params.size(); ++i) {
       if (in_graph[i]) entries += double(params[i]->value.size());

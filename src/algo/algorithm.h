@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -57,10 +56,10 @@ struct FixedDraws {
   std::vector<Mat> dropout;  // keep masks 0/1 in forward order; empty: drawn
 };
 
-/// A learner: acts on N workers, learns from what came back.
-class Algorithm {
+/// What the training loop asks of a method: it acts on N workers and learns from what came back.
+class Learner {
  public:
-  virtual ~Algorithm() = default;
+  virtual ~Learner() = default;
 
   /// One rollout. Appends the episodes that ended.
   virtual void Collect(VecEnv& env, std::vector<Episode>& episodes) = 0;
@@ -68,17 +67,20 @@ class Algorithm {
   virtual const std::vector<Ratio>& Update() = 0;
   /// Columns of updates.csv after `step`.
   virtual std::vector<std::string> StatNames() const = 0;
-
   /// The workers have been put on another task, between two updates. Nothing is frozen or reset by
   /// most methods. Source: spec 6.
   virtual void ChangeTask() {}
-
   /// All trainable arrays in the order of the network; names as in the checkpoint format.
   virtual std::vector<Param*> Params() = 0;
   /// All state that a resumed run needs, the parameters included.
   virtual void Visit(StateVisitor& v) = 0;
+};
 
-  // ---- What the networks say. Dropout off; options given by the caller.
+/// What the networks of a method say: for evaluation, films and analysis. Dropout is off; the
+/// options are given by the caller.
+class Policy {
+ public:
+  virtual ~Policy() = default;
 
   /// K; 1 for a method without options.
   virtual int NumOptions() const = 0;
@@ -90,19 +92,23 @@ class Algorithm {
   /// s (S, B), o (B) the option that the critic is fed -> q (K, B).
   virtual void OptionValues(const Mat& s, const std::vector<int>& o, Mat& q) = 0;
 
-  /// W_o (D, K), whose column k is the embedding o_hat of option k, as one of Params(); null for a
-  /// method whose options have none.
+  /// W_o (D, K), whose column k is the embedding o_hat of option k, as one of the learner's
+  /// parameters; null for a method whose options have none.
   virtual Param* Embedding() { return nullptr; }
   /// s (S, B), o (B) -> J (A, D), mean over the samples of d mu / d o_hat at the embedding of the
   /// option given. Throws Error without an embedding.
   virtual void MeanJacobian(const Mat&, const std::vector<int>&, MatD&) {
     throw Error("the method's options have no embedding");
   }
+};
 
-  // ---- Parts of Update, one by one.
+/// The parts of Learner::Update one by one: for gradient checks and oracles.
+class Stages {
+ public:
+  virtual ~Stages() = default;
 
-  /// Names of the stages: {"high", "low"} for a two-stage method, else {"all"}.
-  virtual std::vector<std::string> Stages() const = 0;
+  /// {"high", "low"}, the option and the action stage of a two-stage method, else {"all"}.
+  virtual std::vector<std::string> StageNames() const = 0;
   /// Loss of a stage on a batch; adds its gradients to Params(). `fixed` may be null.
   virtual LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) = 0;
   /// Clips the gradients, steps the optimiser by the stage's idle rule and zeroes the gradients.
@@ -111,6 +117,9 @@ class Algorithm {
   /// The tensors that the stage's loss can reach, by position in Params().
   virtual std::vector<char> InGraph(int stage) const = 0;
 };
+
+/// A learning method.
+class Algorithm : public Learner, public Policy, public Stages {};
 
 /// A registry line.
 struct AlgorithmEntry {

@@ -73,7 +73,7 @@ class Method : public Algorithm {
   /// The first K outputs of the critic given to RegisterNetworks.
   void OptionValues(const Mat& s, const std::vector<int>& o, Mat& q) override;
 
-  std::vector<std::string> Stages() const override { return stages_; }
+  std::vector<std::string> StageNames() const override { return stages_; }
   double Step(int stage) override;
   std::vector<char> InGraph(int stage) const override { return in_graph_[std::size_t(stage)]; }
 

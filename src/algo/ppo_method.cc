@@ -7,7 +7,7 @@ namespace o2v {
 PpoMethod::PpoMethod(const AlgorithmInput& in, Index K, std::vector<std::string> stages,
                      const LossColumns& more)
     : Method(in, K, std::move(stages), more),
-      rollout_(in.S, in.A, N_, in.hyper->Int("rollout", 1), int(Stages().size())),
+      rollout_(in.S, in.A, N_, in.hyper->Int("rollout", 1), int(StageNames().size())),
       a_(in.A, N_),
       T_(in.hyper->Int("rollout", 1)),
       epochs_(in.hyper->Int("epochs", 1)),
@@ -18,7 +18,7 @@ PpoMethod::PpoMethod(const AlgorithmInput& in, Index K, std::vector<std::string>
       bootstrap_(in.switches.timelimit == Fidelity::kPaper),
       not_initial_(std::size_t(N_), 0),
       order_(std::size_t(N_) * std::size_t(T_)),
-      order_rng_(Stages().size() == 2 ? &NewStream("order") : nullptr) {
+      order_rng_(StageNames().size() == 2 ? &NewStream("order") : nullptr) {
   if (order_.size() < 2) {
     throw ConfigError(Concat(in.hyper->Origin("rollout"), ": 'rollout' is 1 with one worker; ",
                              "advantages are normalised over at least two samples"));

@@ -173,7 +173,7 @@ void AddTrain(CLI::App& app) {
 // ---- eval, forward, interpret
 
 /// A checkpoint's policy on its task.
-struct Policy {
+struct LoadedPolicy {
   RunConfig config;
   std::unique_ptr<Env> env;
   std::unique_ptr<Algorithm> algorithm;
@@ -181,7 +181,7 @@ struct Policy {
 };
 
 /// `request` completes, or repeats, what the file says of itself.
-Policy LoadPolicyFile(const std::string& checkpoint, RunRequest request) {
+LoadedPolicy LoadPolicyFile(const std::string& checkpoint, RunRequest request) {
   const Metadata metadata = ReadMetadata(checkpoint);
   if (const auto config = metadata.find("config"); config != metadata.end()) {
     const RunConfig own = ParseRunConfig(config->second, checkpoint);
@@ -200,7 +200,7 @@ Policy LoadPolicyFile(const std::string& checkpoint, RunRequest request) {
   const EnvOptions options{.contact_forces = config.switches.contact_forces};
   std::unique_ptr<Env> env = MakeEnv(SplitTasks(task.value_or(config.task)).back(), options);
   const EnvSpec spec = env->Spec();
-  Policy policy{config, std::move(env), MakeRunAlgorithm(config, spec), Normalizer(spec.S)};
+  LoadedPolicy policy{config, std::move(env), MakeRunAlgorithm(config, spec), Normalizer(spec.S)};
   LoadPolicy(checkpoint, *policy.algorithm, policy.normalizer);
   return policy;
 }
@@ -230,7 +230,7 @@ void AddEval(CLI::App& app) {
       "  option2vec eval --checkpoint foreign.safetensors --task Hopper-v2 --algo ppo "
       "--fidelity released");
   eval->callback([opt] {
-    Policy policy = LoadPolicyFile(opt->checkpoint, opt->request);
+    LoadedPolicy policy = LoadPolicyFile(opt->checkpoint, opt->request);
     const auto episodes = Evaluate(*policy.algorithm, policy.normalizer, *policy.env, opt->episodes,
                                    opt->action == "sample", opt->seed);
     std::vector<double> returns;
@@ -261,7 +261,7 @@ void AddForward(CLI::App& app) {
       "Example:\n"
       "  option2vec forward --checkpoint runs/a/last.ckpt --input states.csv --out outputs.csv");
   forward->callback([opt] {
-    Policy policy = LoadPolicyFile(opt->checkpoint, opt->request);
+    LoadedPolicy policy = LoadPolicyFile(opt->checkpoint, opt->request);
     Forward(*policy.algorithm, policy.env->Spec(), opt->input, opt->output);
   });
 }
@@ -298,7 +298,7 @@ void AddInterpret(CLI::App& app) {
       "Example:\n  option2vec interpret runs/a --episodes 20 --out a.csv");
   interpret->callback([opt] {
     const std::filesystem::path file = FindCheckpoint(opt->run);
-    Policy policy = LoadPolicyFile(file.string(), opt->request);
+    LoadedPolicy policy = LoadPolicyFile(file.string(), opt->request);
     if (!policy.algorithm->Embedding()) {
       throw ConfigError(Concat(file.string(), ": made by ", policy.config.algorithm,
                                ", whose options have no embedding"));

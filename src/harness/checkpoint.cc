@@ -173,8 +173,8 @@ File ParseFile(const std::filesystem::path& path) {
 /// Names of tensors in the file for those that Visit functions use.
 class Names {
  public:
-  explicit Names(Algorithm& algorithm) {
-    for (const Param* p : algorithm.Params()) params_.insert(p->name);
+  explicit Names(Learner& learner) {
+    for (const Param* p : learner.Params()) params_.insert(p->name);
   }
   bool IsParam(std::string_view name) const { return params_.contains(name); }
   std::string InFile(std::string_view name) const {
@@ -335,23 +335,23 @@ MatD ReadReals(const File& file, const std::string& name, Index rows, Index cols
 
 }  // namespace
 
-void SaveCheckpoint(const std::filesystem::path& path, Metadata metadata, Algorithm& algorithm,
+void SaveCheckpoint(const std::filesystem::path& path, Metadata metadata, Learner& learner,
                     const StateWalk& walk, const std::function<void()>& before_rename) {
-  const Names names(algorithm);
+  const Names names(learner);
   Saver saver(names);
   walk(saver);
-  for (const Param* p : algorithm.Params()) {
+  for (const Param* p : learner.Params()) {
     Check(saver.Has(p->name), "checkpoint: the method does not show ", p->name);
   }
   WriteFileAtomically(path, saver.Text(std::move(metadata)), before_rename);
 }
 
-Metadata LoadCheckpoint(const std::filesystem::path& path, Algorithm& algorithm,
+Metadata LoadCheckpoint(const std::filesystem::path& path, Learner& learner,
                         const StateWalk& walk) {
   File file = ParseFile(path);
   file.Require(file.ours, "not a checkpoint of a run: its format is not ", kFormat);
   for (const char* added : {"format", "checksum"}) file.metadata.erase(added);
-  const Names names(algorithm);
+  const Names names(learner);
   Loader check(file, names, /*copy=*/false);
   walk(check);
   check.RequireAllSeen();
@@ -373,16 +373,16 @@ std::optional<std::int64_t> TotalSteps(const Metadata& metadata) {
   return steps;
 }
 
-void LoadPolicy(const std::filesystem::path& path, Algorithm& algorithm, Normalizer& normalizer) {
+void LoadPolicy(const std::filesystem::path& path, Learner& learner, Normalizer& normalizer) {
   const File file = ParseFile(path);
-  const Names names(algorithm);
+  const Names names(learner);
   const std::set<std::string, std::less<>> statistics = {"normalizer.mean", "normalizer.var",
                                                          "normalizer.count"};
   for (const auto& [name, t] : file.tensors) {
     file.Require(names.IsParam(name) || statistics.contains(name) || name.starts_with("training."),
                  name, " is not a parameter of the method");
   }
-  const std::vector<Param*> params = algorithm.Params();
+  const std::vector<Param*> params = learner.Params();
   std::vector<Mat> values;
   for (const Param* p : params) {
     values.push_back(ReadReals(file, p->name, p->value.rows(), p->value.cols()).cast<Real>());

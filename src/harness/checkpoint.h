@@ -2,7 +2,7 @@
 // Checkpoints in the safetensors layout: u64 little-endian length of the header, a JSON header
 // {name: {dtype, shape, data_offsets}}, then the data.
 //
-//   <parameter>       F32, named and shaped as Algorithm::Params(), row-major, vectors (n, 1)
+//   <parameter>       F32, named and shaped as Learner::Params(), row-major, vectors (n, 1)
 //   normalizer.mean   F64 (S, 1);  normalizer.var F64 (S, 1);  normalizer.count F64 (1, 1)
 //   training.<name>   all else that a resumed run needs: F32 matrices, F64 and I64 (n, 1)
 //   __metadata__      strings; "format" tells our files from others; "checksum" covers the metadata
@@ -28,14 +28,13 @@ using Metadata = std::map<std::string, std::string>;
 using StateWalk = std::function<void(StateVisitor&)>;
 
 /// Writes a checkpoint with WriteFileAtomically. "format" and "checksum" are added to the metadata.
-void SaveCheckpoint(const std::filesystem::path& path, Metadata metadata, Algorithm& algorithm,
+void SaveCheckpoint(const std::filesystem::path& path, Metadata metadata, Learner& learner,
                     const StateWalk& walk, const std::function<void()>& before_rename = {});
 
 /// Restores all state of a run from a file of SaveCheckpoint, which must hold exactly the tensors
 /// that `walk` shows, finite and within the bounds that the walk states. Returns the metadata that
 /// SaveCheckpoint was given.
-Metadata LoadCheckpoint(const std::filesystem::path& path, Algorithm& algorithm,
-                        const StateWalk& walk);
+Metadata LoadCheckpoint(const std::filesystem::path& path, Learner& learner, const StateWalk& walk);
 
 /// The metadata of a file; empty for one from elsewhere, whatever it says.
 Metadata ReadMetadata(const std::filesystem::path& path);
@@ -46,6 +45,6 @@ std::optional<std::int64_t> TotalSteps(const Metadata& metadata);
 /// state, no normalizer.count, F64 numbers. Every parameter must be there with its shape and finite
 /// values; a name that is neither a parameter, nor of the normaliser, nor training state is
 /// refused.
-void LoadPolicy(const std::filesystem::path& path, Algorithm& algorithm, Normalizer& normalizer);
+void LoadPolicy(const std::filesystem::path& path, Learner& learner, Normalizer& normalizer);
 
 }  // namespace o2v

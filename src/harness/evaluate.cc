@@ -32,7 +32,7 @@ int ReadIndex(const CsvTable& table, std::size_t row, std::size_t column, int n)
 
 }  // namespace
 
-std::vector<EvalEpisode> Evaluate(Algorithm& algorithm, const Normalizer& normalizer, Env& env,
+std::vector<EvalEpisode> Evaluate(Policy& policy, const Normalizer& normalizer, Env& env,
                                   int episodes, bool sample_action, std::uint64_t seed,
                                   const VisitHook& visit, const std::function<bool()>& stop) {
   const EnvSpec& spec = env.Spec();
@@ -54,10 +54,10 @@ std::vector<EvalEpisode> Evaluate(Algorithm& algorithm, const Normalizer& normal
       if (stop && stop()) return results;
       normalizer.Apply(raw, state);
       s = state;
-      algorithm.OptionPolicy(s, o_prev, init, P);
+      policy.OptionPolicy(s, o_prev, init, P);
       SampleCategorical(P, options, o);
       if (visit) visit(s, o[0]);
-      algorithm.ActionPolicy(s, o, mu, sigma);
+      policy.ActionPolicy(s, o, mu, sigma);
       for (std::size_t j = 0; j < a.size(); ++j) {
         const Index row = static_cast<Index>(j);
         double x = static_cast<double>(mu(row, 0));
@@ -76,13 +76,13 @@ std::vector<EvalEpisode> Evaluate(Algorithm& algorithm, const Normalizer& normal
   return results;
 }
 
-void Forward(Algorithm& algorithm, const EnvSpec& spec, const std::filesystem::path& input,
+void Forward(Policy& policy, const EnvSpec& spec, const std::filesystem::path& input,
              const std::filesystem::path& output) {
   const CsvTable in = ReadCsv(input);
   const std::size_t n = in.Rows(), expected = static_cast<std::size_t>(spec.S) + 3;
   Check(in.columns.size() == expected, in.path, ":1: ", in.columns.size(), " columns, not the ",
         expected, " of s0.. (", spec.S, "), o_prev, init, o");
-  const int K = algorithm.NumOptions();
+  const int K = policy.NumOptions();
   Mat s(spec.S, static_cast<Index>(n));
   std::vector<int> o(n), o_prev(n);
   std::vector<char> init(n);
@@ -97,9 +97,9 @@ void Forward(Algorithm& algorithm, const EnvSpec& spec, const std::filesystem::p
   }
 
   Mat P, mu, sigma, q;
-  algorithm.OptionPolicy(s, o_prev, init, P);
-  algorithm.ActionPolicy(s, o, mu, sigma);
-  algorithm.OptionValues(s, o, q);
+  policy.OptionPolicy(s, o_prev, init, P);
+  policy.ActionPolicy(s, o, mu, sigma);
+  policy.OptionValues(s, o, q);
   CsvTable out;
   const std::pair<const char*, const Mat*> outputs[] = {
       {"P", &P}, {"mu", &mu}, {"sigma", &sigma}, {"q", &q}};

@@ -25,7 +25,7 @@ using VisitHook = std::function<void(const Mat& s, int o)>;
 /// policy; actions from the Gaussian, or its mean when `sample_action` is false. The same seed
 /// gives the same episodes: all randomness comes from streams "eval.*" of `seed`. `stop` is asked
 /// before each step; when it says true, the episodes that have ended are returned.
-std::vector<EvalEpisode> Evaluate(Algorithm& algorithm, const Normalizer& normalizer, Env& env,
+std::vector<EvalEpisode> Evaluate(Policy& policy, const Normalizer& normalizer, Env& env,
                                   int episodes, bool sample_action, std::uint64_t seed,
                                   const VisitHook& visit = {},
                                   const std::function<bool()>& stop = {});
@@ -34,7 +34,7 @@ std::vector<EvalEpisode> Evaluate(Algorithm& algorithm, const Normalizer& normal
 /// state), o_prev, init, o (0-based; the option fed to action net and critic), in any order, and
 /// writes one with P0.. (K), mu0.. (A), sigma0.. (A), q0.. (K), a row each. Throws Error for other
 /// columns, options outside [0, K) and flags other than 0 and 1.
-void Forward(Algorithm& algorithm, const EnvSpec& spec, const std::filesystem::path& input,
+void Forward(Policy& policy, const EnvSpec& spec, const std::filesystem::path& input,
              const std::filesystem::path& output);
 
 }  // namespace o2v

@@ -28,15 +28,15 @@ bool IsInterpretation(const std::string& json) {
 
 }  // namespace
 
-Interpretation Interpret(Algorithm& algorithm, const Normalizer& normalizer, Env& env, int episodes,
+Interpretation Interpret(Policy& policy, const Normalizer& normalizer, Env& env, int episodes,
                          double delta, std::uint64_t seed) {
-  Param* const embedding = algorithm.Embedding();
+  Param* const embedding = policy.Embedding();
   Check(embedding != nullptr, "interpret: the method's options have no embedding");
   Check(delta > 0 && std::isfinite(delta), "interpret: delta is ", delta, ", not positive");
 
   std::vector<Real> visited;  // states, one after the other
   std::vector<int> o;
-  Evaluate(algorithm, normalizer, env, episodes, /*sample_action=*/true, seed,
+  Evaluate(policy, normalizer, env, episodes, /*sample_action=*/true, seed,
            [&](const Mat& s, int option) {
              visited.insert(visited.end(), s.data(), s.data() + s.size());
              o.push_back(option);
@@ -52,12 +52,12 @@ Interpretation Interpret(Algorithm& algorithm, const Normalizer& normalizer, Env
   } const restore{W_o, kept};
   MatD J;
   Mat mu, moved, sigma;
-  algorithm.MeanJacobian(s, o, J);
-  algorithm.ActionPolicy(s, o, mu, sigma);
+  policy.MeanJacobian(s, o, J);
+  policy.ActionPolicy(s, o, mu, sigma);
   MatD perturbed(W_o.rows(), mu.rows());
   for (Index d = 0; d < W_o.rows(); ++d) {
     W_o.row(d).array() += static_cast<Real>(delta);
-    algorithm.ActionPolicy(s, o, moved, sigma);
+    policy.ActionPolicy(s, o, moved, sigma);
     perturbed.row(d) = (moved.cast<double>() - mu.cast<double>()).rowwise().mean().transpose();
     W_o.row(d) = kept.row(d);
   }

@@ -36,7 +36,7 @@ struct Interpretation {
 /// Means over the states of `episodes` whole episodes, which run as in Evaluate with sampled
 /// actions: the same seed gives the same result. W_o is moved on the way and put back. Throws Error
 /// for a method without an embedding and unless delta is positive and finite.
-Interpretation Interpret(Algorithm& algorithm, const Normalizer& normalizer, Env& env, int episodes,
+Interpretation Interpret(Policy& policy, const Normalizer& normalizer, Env& env, int episodes,
                          double delta, std::uint64_t seed);
 
 /// A row a dimension: dimension, embedding_0.. (K), effect_0.. (A), perturbed_0.. (A), delta.

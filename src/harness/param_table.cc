@@ -151,7 +151,7 @@ std::string Note(const std::vector<ParamRow>& rows) {
 
 std::vector<char> InAnyGraph(const Algorithm& algorithm) {
   std::vector<char> any = algorithm.InGraph(0);
-  for (int stage = 1; stage < int(algorithm.Stages().size()); ++stage) {
+  for (int stage = 1; stage < int(algorithm.StageNames().size()); ++stage) {
     const std::vector<char> in_graph = algorithm.InGraph(stage);
     std::transform(any.begin(), any.end(), in_graph.begin(), any.begin(), std::logical_or<>());
   }

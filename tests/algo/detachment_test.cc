@@ -57,7 +57,7 @@ TEST(Detachment, AStageReachesItsTensorsAlone) {
     for (const Fidelity fidelity : kFidelities) {
       Reached r(method.id, fidelity);
       const std::vector<Param*> params = r.algorithm->Params();
-      for (std::size_t stage = 0; stage < r.algorithm->Stages().size(); ++stage) {
+      for (std::size_t stage = 0; stage < r.algorithm->StageNames().size(); ++stage) {
         r.Loss(int(stage));
         const std::vector<char> in_graph = r.algorithm->InGraph(int(stage));
         for (std::size_t i = 0; i < params.size(); ++i) {

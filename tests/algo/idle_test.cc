@@ -120,7 +120,7 @@ TEST(Minibatches, OfARemainderAreUsed) {
     algorithm->Visit(counts);
     for (std::size_t i = 0; i < counts.t.size(); ++i) {
       int stages = 0;
-      for (std::size_t stage = 0; stage < algorithm->Stages().size(); ++stage) {
+      for (std::size_t stage = 0; stage < algorithm->StageNames().size(); ++stage) {
         stages += algorithm->InGraph(int(stage))[i];
       }
       EXPECT_EQ(counts.t[i], 3 * 2 * stages) << method.id << ", " << algorithm->Params()[i]->name;

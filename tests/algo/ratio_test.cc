@@ -19,7 +19,7 @@ std::vector<double> Deviating(const std::string& method, Fidelity fidelity,
   const auto algorithm = MakeRunAlgorithm(config, env.Spec());
   const std::vector<double> stats = Iterate(*algorithm, env);
   std::vector<double> shares;
-  for (const std::string& stage : algorithm->Stages()) {
+  for (const std::string& stage : algorithm->StageNames()) {
     shares.push_back(Stat(*algorithm, stats, "clip_fraction_" + stage));
   }
   return shares;

@@ -27,7 +27,7 @@ TEST(Statistics, OfTheTermsOfALossAddUpToIt) {
       VecEnv env = PointTask(config.workers, /*time_limit=*/5);
       const auto algorithm = MakeRunAlgorithm(config, env.Spec());
       const std::vector<double> stats = Iterate(*algorithm, env);
-      for (const std::string& stage : algorithm->Stages()) {
+      for (const std::string& stage : algorithm->StageNames()) {
         const auto term = [&](const std::string& name) {
           return Stat(*algorithm, stats, name + "_" + stage);
         };

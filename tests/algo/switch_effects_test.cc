@@ -43,7 +43,7 @@ struct OnBatch {
 std::vector<double> Losses(const RunConfig& config) {
   OnBatch on(config);
   std::vector<double> out;
-  for (std::size_t stage = 0; stage < on.algorithm->Stages().size(); ++stage) {
+  for (std::size_t stage = 0; stage < on.algorithm->StageNames().size(); ++stage) {
     out.push_back(on.algorithm->Loss(int(stage), on.batch, nullptr).total);
     for (const Param* p : on.algorithm->Params()) Append(out, p->grad);
     ZeroGrad(on.algorithm->Params());
@@ -54,7 +54,7 @@ std::vector<double> Losses(const RunConfig& config) {
 /// Parameters after a step of each stage.
 std::vector<double> Steps(const RunConfig& config) {
   OnBatch on(config);
-  for (std::size_t stage = 0; stage < on.algorithm->Stages().size(); ++stage) {
+  for (std::size_t stage = 0; stage < on.algorithm->StageNames().size(); ++stage) {
     on.algorithm->Loss(int(stage), on.batch, nullptr);
     on.algorithm->Step(int(stage));
   }

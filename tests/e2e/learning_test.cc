@@ -64,7 +64,7 @@ TEST_P(Learning, KeepsAPointNearZero) {
       const Trained trained(*algorithm, env, budget.steps);
       EXPECT_LT(trained.First(), -15);
       EXPECT_GT(trained.Last(), -10);
-      for (const std::string& stage : algorithm->Stages()) {
+      for (const std::string& stage : algorithm->StageNames()) {
         const std::string name = "value_loss_" + stage;
         EXPECT_LT(Stat(*algorithm, trained.updates.back(), name),
                   0.5 * Stat(*algorithm, trained.updates.front(), name))

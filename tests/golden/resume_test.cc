@@ -102,7 +102,7 @@ class KilledAlgorithm final : public Algorithm {
     algorithm_->OptionValues(s, o, q);
   }
   void ChangeTask() override { algorithm_->ChangeTask(); }
-  std::vector<std::string> Stages() const override { return algorithm_->Stages(); }
+  std::vector<std::string> StageNames() const override { return algorithm_->StageNames(); }
   LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) override {
     return algorithm_->Loss(stage, batch, fixed);
   }

@@ -178,14 +178,14 @@ void PpoProblem::Fill() {
   Draw(kB);
   Says x;
   Ask(batch_, "", x);
-  for (int stage = 0; stage < int(algo_->Stages().size()); ++stage) {
-    Stream& stream = algo_->Stages().size() == 2 && stage == 0 ? batch_.high : batch_.low;
+  for (int stage = 0; stage < int(algo_->StageNames().size()); ++stage) {
+    Stream& stream = algo_->StageNames().size() == 2 && stage == 0 ? batch_.high : batch_.low;
     for (int b = 0; b < kB; ++b) {
       Place(stream, b, double(LogProb(stage, batch_, x, b)),
             double(Prediction(stage, batch_, x, b)));
     }
   }
-  for (int stage = 0; stage < int(algo_->Stages().size()); ++stage) CheckLoss(stage);
+  for (int stage = 0; stage < int(algo_->StageNames().size()); ++stage) CheckLoss(stage);
 }
 
 /// The network of spec 2.3, and what its methods have in common.

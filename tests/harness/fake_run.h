@@ -113,7 +113,7 @@ class FakeAlgorithm : public Algorithm {
     for (Index b = 0; b < s.cols(); ++b) q(1, b) += static_cast<Real>(o[std::size_t(b)]);
   }
 
-  std::vector<std::string> Stages() const override { return {"all"}; }
+  std::vector<std::string> StageNames() const override { return {"all"}; }
   LossTerms Loss(int, const Batch&, const FixedDraws*) override { return {}; }
   double Step(int) override { return 0; }
   std::vector<char> InGraph(int) const override { return {1, 1}; }

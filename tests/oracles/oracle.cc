@@ -148,7 +148,7 @@ Batch ReadBatch(const json& file, const OracleMethod& method, const Algorithm& a
   batch.o.assign(B, 0);
   batch.o_prev.assign(B, 0);
   batch.init = OracleFlags(given.at("init"), batch.Size());
-  if (algorithm.Stages().size() == 2) {
+  if (algorithm.StageNames().size() == 2) {
     ReadStream(given, "_high", switches.adv_std_eps, batch.high, out);
     ReadStream(given, "_low", switches.adv_std_eps, batch.low, out);
   } else if (!OwnTargets(file)) {
@@ -160,7 +160,7 @@ Batch ReadBatch(const json& file, const OracleMethod& method, const Algorithm& a
 
 void CompareLosses(const json& file, const OracleMethod& method, Algorithm& algorithm,
                    const Batch& batch, Comparison& out) {
-  const std::vector<std::string> stages = algorithm.Stages();
+  const std::vector<std::string> stages = algorithm.StageNames();
   for (std::size_t i = 0; i < stages.size(); ++i) {
     const std::string place = "losses." + stages[i] + ".";
     const json& losses = file.at("losses").at(stages[i]);
@@ -189,7 +189,7 @@ void CompareUpdates(const json& file, const OracleMethod& method, const std::str
                     Algorithm& algorithm, const Batch& batch, double clip_norm, Comparison& out) {
   const json& updates = file.at(key);
   const json& trace = updates.at("trace");
-  const std::vector<std::string> stages = algorithm.Stages();
+  const std::vector<std::string> stages = algorithm.StageNames();
   const std::vector<Param*> params = algorithm.Params();
   std::vector<std::size_t> taken(stages.size(), 0);
   std::set<std::string> without;  // tensors that no loss has involved yet
