@@ -26,6 +26,7 @@
 #include "harness/evaluate.h"
 #include "harness/interpret.h"
 #include "harness/jobs.h"
+#include "harness/manifest.h"
 #include "harness/param_table.h"
 #include "harness/record.h"
 #include "harness/summary.h"
@@ -496,6 +497,7 @@ int Main(int argc, char** argv) {
   CLI::App app("Option2Vec and PPO on MuJoCo tasks: reference reproduction.", "option2vec");
   app.require_subcommand(1);
   app.footer("option2vec <subcommand> --help shows options and examples.");
+  app.set_version_flag("--version", VersionText, "commit, compiler, flags, versions, libmujoco");
   int exit_code = 0;
   AddList(app);
   AddTrain(app);

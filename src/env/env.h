@@ -62,5 +62,12 @@ std::unique_ptr<Env> MakeEnv(const std::string& id, const EnvOptions& options);
 
 /// Version of the simulator, "2.2.2".
 std::string PhysicsVersion();
+/// The simulator's library that this process has loaded.
+struct PhysicsLibrary {
+  std::string file;    // absolute, without links
+  std::string sha256;  // of the file
+};
+/// Hashed once. Throws Error when the file cannot be read.
+const PhysicsLibrary& LoadedPhysics();
 
 }  // namespace o2v

@@ -7,6 +7,7 @@
 
 #include "base/check.h"
 #include "base/files.h"
+#include "base/printable.h"
 #include "build_info.h"
 #include "env/env.h"
 
@@ -48,9 +49,23 @@ RunStatus ParseStatus(const std::string& name) {
   throw Error("unknown status '" + name + "'");
 }
 
+std::string VersionText() {
+  const ordered_json build = Build();
+  std::string text;
+  for (const char* key : {"commit", "compiler", "flags"}) {
+    text += Concat(key, ' ', build.at(key).get<std::string>(), '\n');
+  }
+  for (const auto& [name, version] : build.at("versions").items()) {
+    text += Concat(name, ' ', version.get<std::string>(), '\n');
+  }
+  const PhysicsLibrary& physics = LoadedPhysics();
+  return text + Concat("physics ", Printable(physics.file), " SHA-256 ", physics.sha256);
+}
+
 std::string BuildJson() { return Build().dump(2) + "\n"; }
 
 std::string ManifestJson(const Manifest& manifest) {
+  const PhysicsLibrary& physics = LoadedPhysics();
   ordered_json out = {{"status", ToString(manifest.status)},
                       {"start", manifest.start},
                       {"end", manifest.end},
@@ -58,9 +73,11 @@ std::string ManifestJson(const Manifest& manifest) {
                       {"wall_seconds", manifest.wall_seconds},
                       {"cpu_seconds", manifest.cpu_seconds},
                       {"cpu", CpuModel()},
+                      {"physics", {{"file", physics.file}, {"sha256", physics.sha256}}},
                       {"revision", manifest.revision}};
   out.update(Build());
-  return out.dump(2) + "\n";
+  // A file's name may be any bytes.
+  return out.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
 }
 
 void WriteManifest(const std::filesystem::path& dir, const Manifest& manifest) {

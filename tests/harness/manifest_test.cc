@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "fake_run.h"
@@ -33,6 +35,23 @@ TEST(Manifest, NamesBuildAndMachine) {
   }
   EXPECT_EQ(json.at("versions").at("mujoco"), PhysicsVersion());
   EXPECT_TRUE(json.at("versions").at("eigen").get<std::string>().starts_with("3."));
+}
+
+TEST(Manifest, NamesTheLibraryOfTheSimulatorThatIsLoaded) {
+  // The kernel's word for it, and another program's hash.
+  std::ifstream maps("/proc/self/maps");
+  std::string file;
+  for (std::string line; file.empty() && std::getline(maps, line);) {
+    const std::size_t path = line.find('/');
+    if (line.find("/libmujoco.so") != std::string::npos) file = line.substr(path);
+  }
+  ASSERT_FALSE(file.empty());
+  const TestFolder dir;
+  const std::string hash = dir / "hash";
+  ASSERT_EQ(std::system(("sha256sum < '" + file + "' > '" + hash + "'").c_str()), 0);
+  const auto json = nlohmann::json::parse(ManifestJson({}));
+  EXPECT_EQ(json.at("physics").at("file"), file);
+  EXPECT_EQ(json.at("physics").at("sha256"), ReadFile(hash).substr(0, 64));
 }
 
 TEST(Manifest, MayBeMissing) {
