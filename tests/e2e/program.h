@@ -19,10 +19,10 @@ struct Outcome {
 
 class Program : public testing::Test {
  protected:
-  /// Runs `option2vec <arguments>` in the test's folder.
-  Outcome Run(const std::string& arguments) const {
-    const std::string command = "cd '" + dir_.path().string() + "' && '" + O2V_PROGRAM + "' " +
-                                arguments + " > stdout 2> stderr < /dev/null";
+  /// Runs `<environment> option2vec <arguments>` in the test's folder.
+  Outcome Run(const std::string& arguments, const std::string& environment = "") const {
+    const std::string command = "cd '" + dir_.path().string() + "' && " + environment + " '" +
+                                O2V_PROGRAM + "' " + arguments + " > stdout 2> stderr < /dev/null";
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, ReadFile(dir_ / "stdout"),
             ReadFile(dir_ / "stderr")};
