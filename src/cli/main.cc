@@ -31,6 +31,7 @@
 #include "harness/record.h"
 #include "harness/summary.h"
 #include "harness/trainer.h"
+#include "nn/isa.h"
 
 namespace o2v {
 namespace {
@@ -497,7 +498,7 @@ int Main(int argc, char** argv) {
   CLI::App app("Option2Vec and PPO on MuJoCo tasks: reference reproduction.", "option2vec");
   app.require_subcommand(1);
   app.footer("option2vec <subcommand> --help shows options and examples.");
-  app.set_version_flag("--version", VersionText, "commit, compiler, flags, versions, libmujoco");
+  app.set_version_flag("--version", VersionText, "commit, compiler, flags, versions, products, libmujoco");
   int exit_code = 0;
   AddList(app);
   AddTrain(app);
@@ -518,6 +519,7 @@ int Main(int argc, char** argv) {
   std::ostringstream text;
   std::streambuf* const own = std::cout.rdbuf(text.rdbuf());
   try {
+    ChosenIsa();  // throws when O2V_ISA is wrong
     app.parse(argc, argv);
   } catch (const CLI::Success& e) {  // --help
     exit_code = app.exit(e);

@@ -10,6 +10,7 @@
 #include "base/printable.h"
 #include "build_info.h"
 #include "env/env.h"
+#include "nn/isa.h"
 
 namespace o2v {
 namespace {
@@ -59,7 +60,8 @@ std::string VersionText() {
     text += Concat(name, ' ', version.get<std::string>(), '\n');
   }
   const PhysicsLibrary& physics = LoadedPhysics();
-  return text + Concat("physics ", Printable(physics.file), " SHA-256 ", physics.sha256);
+  return text + Concat("products ", ToString(ChosenIsa()), "\nphysics ", Printable(physics.file),
+                       " SHA-256 ", physics.sha256);
 }
 
 std::string BuildJson() { return Build().dump(2) + "\n"; }
@@ -73,6 +75,7 @@ std::string ManifestJson(const Manifest& manifest) {
                       {"wall_seconds", manifest.wall_seconds},
                       {"cpu_seconds", manifest.cpu_seconds},
                       {"cpu", CpuModel()},
+                      {"products", ToString(ChosenIsa())},
                       {"physics", {{"file", physics.file}, {"sha256", physics.sha256}}},
                       {"revision", manifest.revision}};
   out.update(Build());

@@ -26,7 +26,8 @@ struct Manifest {
 
 /// What this program was built from, a JSON object: commit, compiler, flags, versions.
 std::string BuildJson();
-/// Commit, compiler, flags, versions and the simulator's library, one a line.
+/// Commit, compiler, flags, versions, instruction set of products and the simulator's library, one
+/// a line.
 std::string VersionText();
 /// Text of a manifest.json.
 std::string ManifestJson(const Manifest& manifest);

@@ -8,6 +8,7 @@
 
 #include "base/csv.h"
 #include "base/files.h"
+#include "nn/isa.h"
 #include "program.h"
 
 namespace o2v {
@@ -173,6 +174,26 @@ TEST_F(Program, InterpretsOption2VecOnly) {
   EXPECT_NE(foreign.err.find("x: embed.W_o is missing"), std::string::npos) << foreign.err;
   EXPECT_FALSE(fs::exists(dir_ / "y.csv"));
   EXPECT_FALSE(fs::exists(dir_ / "results"));
+}
+
+TEST_F(Program, TakesTheInstructionSetItIsTold) {
+  const Outcome wrong = Run("list tasks", "O2V_ISA=v5");
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_EQ(wrong.err, "option2vec: O2V_ISA: expected v3 or v4, got 'v5'\n");
+  EXPECT_NE(Run("--version", "O2V_ISA=v3").out.find("\nproducts v3\n"), std::string::npos);
+  const Outcome v4 = Run("--version", "O2V_ISA=v4");
+  if (!HasV4()) {
+    EXPECT_EQ(v4.code, 2);
+    EXPECT_EQ(v4.err, "option2vec: O2V_ISA: v4, but this processor has no AVX-512\n");
+    GTEST_SKIP() << "this processor has no AVX-512";
+  }
+  EXPECT_NE(v4.out.find("\nproducts v4\n"), std::string::npos);
+  const std::string train =
+      "train --task HalfCheetah-v2 --algo option2vec --steps 512 --set rollout=256 --out ";
+  ASSERT_EQ(Run(train + "v3", "O2V_ISA=v3").code, 0);
+  ASSERT_EQ(Run(train + "v4", "O2V_ISA=v4").code, 0);
+  EXPECT_TRUE(ReadFile(dir_ / "v3/last.ckpt") == ReadFile(dir_ / "v4/last.ckpt"));
+  EXPECT_NE(ReadFile(dir_ / "v4/manifest.json").find("\"products\": \"v4\""), std::string::npos);
 }
 
 TEST_F(Program, ReplayPassesOnItsOwnOutputAndFailsOnAnother) {

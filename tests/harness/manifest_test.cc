@@ -34,6 +34,7 @@ TEST(Manifest, NamesBuildAndMachine) {
     EXPECT_FALSE(json.at(key).get<std::string>().empty()) << key;
   }
   EXPECT_EQ(json.at("versions").at("mujoco"), PhysicsVersion());
+  EXPECT_TRUE(json.at("products") == "v3" || json.at("products") == "v4");
   EXPECT_TRUE(json.at("versions").at("eigen").get<std::string>().starts_with("3."));
 }
 

@@ -3,11 +3,16 @@
 #include "nn/product.h"
 
 #include <gtest/gtest.h>
+#include <stdio.h>
 
+#include <cstring>
 #include <limits>
 #include <random>
+#include <string>
 
 #include "base/check.h"
+#include "nn/isa.h"
+#include "nn/product_kernel.h"
 
 namespace o2v {
 namespace {
@@ -79,6 +84,69 @@ TEST_F(Products, AnEntryDependsOnItsRowAndColumnAlone) {
       }
     }
   }
+}
+
+/// What a product of numbers below the smallest normal one, above the largest or of none may meet.
+constexpr Real kOdd[] = {std::numeric_limits<Real>::quiet_NaN(),
+                         std::numeric_limits<Real>::infinity(),
+                         -std::numeric_limits<Real>::infinity(),
+                         std::numeric_limits<Real>::denorm_min(),
+                         std::numeric_limits<Real>::min() / 3,
+                         std::numeric_limits<Real>::max(),
+                         Real(-0.0)};
+
+TEST_F(Products, WideRegistersGiveTheSameBits) {
+  if (!HasV4()) GTEST_SKIP() << "this processor has no AVX-512";
+  // Those of BM_Product, of Humanoid, and some of no round size.
+  constexpr Index kShapes[][3] = {{64, 17, 64},  {64, 64, 1},   {64, 64, 4}, {64, 64, 64},
+                                  {50, 40, 128}, {4, 40, 128},  {40, 40, 4}, {6, 64, 64},
+                                  {64, 376, 64}, {33, 130, 29}, {1, 64, 64}, {300, 9, 1}};
+  for (const auto& [m, k, n] : kShapes) {
+    for (int form = 0; form < 16; ++form) {
+      const bool A_t = form & 1, B_t = form & 2, add = form & 4, odd = form & 8;
+      Mat A = A_t ? Mat::Random(k, m) : Mat::Random(m, k);
+      Mat B = B_t ? Mat::Random(n, k) : Mat::Random(k, n);
+      for (Index i = 0; odd && i < 7; ++i) {
+        A(i * 5 % A.rows(), i * 3 % A.cols()) = kOdd[i];
+        B(i * 7 % B.rows(), i * 2 % B.cols()) = kOdd[6 - i];
+      }
+      const Factor a{A.data(), A_t ? k : 1, A_t ? 1 : m};
+      const Factor b{B.data(), B_t ? n : 1, B_t ? 1 : k};
+      Mat narrow = Mat::Random(m, n), wide = narrow;
+      v3::Multiply(a, b, m, k, n, {narrow.data(), 1, m, add});
+      v4::Multiply(a, b, m, k, n, {wide.data(), 1, m, add});
+      ASSERT_EQ(std::memcmp(narrow.data(), wide.data(), std::size_t(m * n) * sizeof(Real)), 0)
+          << "(" << m << ", " << k << ") times (" << k << ", " << n << "), form " << form;
+      ASSERT_TRUE(odd || narrow.allFinite());
+    }
+  }
+}
+
+TEST(Isa, IsTheOneAskedFor) {
+  EXPECT_EQ(ReadIsa(nullptr, true), std::nullopt);
+  EXPECT_EQ(ReadIsa("v3", true), Isa::kV3);
+  EXPECT_EQ(ReadIsa("v3", false), Isa::kV3);
+  EXPECT_EQ(ReadIsa("v4", true), Isa::kV4);
+  EXPECT_THROW(ReadIsa("v4", false), ConfigError);
+  for (const char* value : {"", "v5", "V3", "v3 ", "avx2"}) {
+    EXPECT_THROW(ReadIsa(value, true), ConfigError) << value;
+  }
+}
+
+TEST(Isa, NoOtherFileRunsWhatIsCompiledForAvx512) {
+  // What the object file lends the linker: one function of ours, and Eigen's under other names.
+  FILE* const nm = ::popen("nm -AC --defined-only --extern-only " O2V_NN_LIBRARY, "r");
+  ASSERT_NE(nm, nullptr);
+  int own = 0;
+  for (char line[4096]; ::fgets(line, sizeof line, nm);) {
+    const std::string symbol = line;
+    if (symbol.find(":product_v4.cc.o:") == std::string::npos) continue;
+    const bool multiply = symbol.find(" T o2v::v4::Multiply(") != std::string::npos;
+    own += multiply;
+    EXPECT_TRUE(multiply || symbol.find("EigenV4::") != std::string::npos) << symbol;
+  }
+  EXPECT_EQ(::pclose(nm), 0);
+  EXPECT_EQ(own, 1);
 }
 
 TEST_F(Products, RefusesShapesThatDoNotFit) {
