@@ -498,7 +498,8 @@ int Main(int argc, char** argv) {
   CLI::App app("Option2Vec and PPO on MuJoCo tasks: reference reproduction.", "option2vec");
   app.require_subcommand(1);
   app.footer("option2vec <subcommand> --help shows options and examples.");
-  app.set_version_flag("--version", VersionText, "commit, compiler, flags, versions, products, libmujoco");
+  app.set_version_flag("--version", VersionText,
+                       "commit, compiler, flags, versions, products, libmujoco");
   int exit_code = 0;
   AddList(app);
   AddTrain(app);
