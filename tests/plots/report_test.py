@@ -5,6 +5,7 @@ import sys
 import tempfile
 import unittest
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from pathlib import Path
 from unittest import mock
 
@@ -136,6 +137,25 @@ class ReportTest(unittest.TestCase):
         self.assertIn("of 3 comparisons 2 have p < 0.05", paragraph.text)
         self.assertIn("With Holm's correction for their number 1 is left: PPO on Ant-v2.",
                       paragraph.text)
+        # A run that ended before its horizon is not one of the authors' runs cut short.
+        ours["Walker2d-v2", "ppo"] = replace(sample(1000), horizon=2)
+        theirs = {key: sample(0) for key in ours}
+        self.assertIn("of 3 comparisons 2 have p < 0.05", report._agreement(
+            [task for task, _ in ours], ours, theirs)[0].text)
+
+    def test_shares_over_all_tasks_are_those_of_a_fidelity_and_a_width(self):
+        rows = [{"task": task, "S": 1, "A": 1, "method": "oc", "fidelity": fidelity,
+                 "width": width, "counted": 100, "used": 90, "share": share}
+                for task, fidelity, width, share in (
+                    ("HalfCheetah-v2", "paper", 64, 0.50), ("Hopper-v2", "paper", 64, 0.40),
+                    ("Ant-v2", "paper", 64, 0.45), ("HalfCheetah-v2", "paper", 128, 0.20),
+                    ("Hopper-v2", "paper", 128, 0.25), ("HalfCheetah-v2", "released", 64, 0.60),
+                    ("Hopper-v2", "released", 64, 0.70))]
+        *_, table = report._parameters(rows)
+        self.assertEqual([(row[1], row[2], *row[6:]) for row in table.rows], [
+            ("paper", "64", "50.0 %", "40.0 to 50.0 %"),
+            ("paper", "128", "20.0 %", "20.0 to 25.0 %"),
+            ("released", "64", "60.0 %", "60.0 to 70.0 %")])
 
     def test_runs_of_unequal_length_are_not_compared(self):
         # Hopper's Option2Vec ran to 1 000 000 steps, DAC+PPO to 500 000: its return there stands
