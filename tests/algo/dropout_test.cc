@@ -84,6 +84,33 @@ TEST(Option2Vec, ActsThroughFreshMasksOfItsProbability) {
   EXPECT_EQ(StreamState(*on.algorithm, "dropout").state, StreamState(dropout).state);
 }
 
+TEST(Option2Vec, RedrawsOptionsThroughTheMasksOfTheUpdate) {
+  Rng rng(6, "batch");
+  const Index B = 40;
+  for (const int stage : {0, 1}) {
+    Dropping on;
+    const Batch batch = RandomBatch(1, 1, 4, B, rng);
+    Rng dropout(1, "dropout"), redraw(1, "redraw");
+    AttentionBlock::Masks& masks = on.c.masks;
+    masks.Resize(on.sizes.heads * on.sizes.K, on.sizes.D, on.sizes.F, 2 * B);
+    FixedDraws fixed;
+    for (Mat* mask :
+         {&masks.attention, &masks.after_attention, &masks.inside_ffn, &masks.after_ffn}) {
+      DrawDropoutMask(0.2, dropout, *mask);
+      fixed.dropout.emplace_back((mask->array() > 0).cast<Real>());
+    }
+    on.net.Forward(batch.s, batch.o_prev, batch.init, &masks, on.c);
+    fixed.o.resize(std::size_t(B));
+    SampleCategorical(on.c.P, redraw, fixed.o);
+    const LossTerms drawn = on.algorithm->Loss(stage, batch, nullptr);
+    const LossTerms given = on.algorithm->Loss(stage, batch, &fixed);
+    EXPECT_NEAR(drawn.value, given.value, 1e-5) << stage;
+    EXPECT_NEAR(drawn.surrogate, given.surrogate, 1e-5) << stage;
+    EXPECT_EQ(StreamState(*on.algorithm, "dropout").state, StreamState(dropout).state) << stage;
+    EXPECT_EQ(StreamState(*on.algorithm, "redraw").state, StreamState(redraw).state) << stage;
+  }
+}
+
 TEST(Option2Vec, IsAskedWithoutDropout) {
   Dropping on;
   Rng rng(5, "states");

@@ -18,5 +18,60 @@ TEST(Iopg, RefusesEpisodesLongerThanTwoTimeLimits) {
   EXPECT_EQ(env.TotalSteps(), 2 * 8);
 }
 
+/// The gradients that an episode of n steps, always the same one, leaves behind.
+std::vector<Mat> GradientsOf(Algorithm& iopg, Index n) {
+  Rng rng(5, "episode");
+  Batch episode = RandomBatch(5, 3, 4, n, rng);
+  episode.init.assign(std::size_t(n), 0);
+  episode.init[0] = 1;
+  for (Param* p : iopg.Params()) p->grad.setZero();
+  iopg.Loss(0, episode, nullptr);
+  std::vector<Mat> gradients;
+  for (const Param* p : iopg.Params()) gradients.push_back(p->grad);
+  return gradients;
+}
+
+TEST(Iopg, GradientsDoNotDependOnTheEpisodeBefore) {
+  // Episodes pass in blocks of 64 steps; what a longer one left in them must not count.
+  const RunConfig config = SmallConfig("iopg", Fidelity::kPaper);
+  const auto fresh = MakeRunAlgorithm(config, Sizes(5, 3)),
+             used = MakeRunAlgorithm(config, Sizes(5, 3));
+  const std::vector<Mat> expected = GradientsOf(*fresh, 5);
+  GradientsOf(*used, 150);
+  GradientsOf(*used, 70);
+  const std::vector<Mat> found = GradientsOf(*used, 5);
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    EXPECT_EQ(found[i], expected[i]) << fresh->Params()[i]->name;
+  }
+}
+
+/// Steps of the running episode of each worker's copy.
+class Lengths final : public StateVisitor {
+ public:
+  explicit Lengths(Algorithm& iopg) { iopg.Visit(*this); }
+  void Matrix(std::string_view, Mat&) override {}
+  void Doubles(std::string_view, double*, std::size_t) override {}
+  void Ints(std::string_view name, std::int64_t* x, std::size_t) override {
+    if (name.ends_with(".length")) lengths.push_back(*x);
+  }
+  std::vector<std::int64_t> lengths;
+};
+
+TEST(Iopg, ForgetsEveryWorkersEpisodeAtAChangeOfTaskUnlessReleased) {
+  for (const Fidelity fidelity : {Fidelity::kPaper, Fidelity::kReleased}) {
+    const RunConfig config = SmallConfig("iopg", fidelity, {"workers=4"});
+    int made = 0;
+    VecEnv env([&] { return std::make_unique<PointEnv>(made++ == 2 ? 5 : 9); }, 4, /*seed=*/3);
+    env.Reset();
+    const auto iopg = MakeRunAlgorithm(config, env.Spec());
+    Iterate(*iopg, env);  // ends with the third worker's episode
+    using Steps = std::vector<std::int64_t>;
+    EXPECT_EQ(Lengths(*iopg).lengths, (Steps{5, 5, 0, 5}));
+    iopg->ChangeTask();
+    EXPECT_EQ(Lengths(*iopg).lengths,
+              fidelity == Fidelity::kPaper ? (Steps{0, 0, 0, 0}) : (Steps{5, 5, 0, 5}));
+  }
+}
+
 }  // namespace
 }  // namespace o2v

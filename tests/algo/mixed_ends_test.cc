@@ -74,7 +74,7 @@ class Arrays final : public StateVisitor, public std::map<std::string, MatD, std
 /// OC's target network and of IOPG's copies are all different.
 class Scatter final : public StateVisitor {
  public:
-  explicit Scatter(Algorithm& algorithm) {
+  Scatter(Algorithm& algorithm, int round) : rng_(17, Concat("weights", round)) {
     for (Param* p : algorithm.Params()) Draw(p->value);
     algorithm.Visit(*this);
   }
@@ -87,7 +87,7 @@ class Scatter final : public StateVisitor {
 
  private:
   void Draw(Mat& x) { x = RandomMat(x.rows(), x.cols(), rng_, 0.5); }
-  Rng rng_{17, "weights"};
+  Rng rng_;
 };
 
 double Normal(Rng& rng) {
@@ -136,16 +136,20 @@ class MixedEnds {
     }
     for (auto* learner : {&learner_, &own_, &copy_}) {
       *learner = MakeRunAlgorithm(config_, own_env_->Spec());
-      Scatter scatter(**learner);
     }
-    w_ = Arrays(*own_);
     K_ = own_->NumOptions();
     gamma_ = config_.hyper.Real("gamma");
     if (method == "oc") std::fill(o_prev_.begin(), o_prev_.end(), 1);
   }
 
-  /// One rollout and the update on it, by the method and by hand.
+  /// One rollout and the update on it, by the method and by hand, with other weights in each round:
+  /// a learner that acts with what it made of those of the round before is found out.
   void Round() {
+    for (Algorithm* learner : {learner_.get(), own_.get(), copy_.get()}) {
+      Scatter scatter(*learner, round_);
+    }
+    ++round_;
+    w_ = Arrays(*own_);
     std::vector<Episode> episodes;
     learner_->Collect(*env_, episodes);
     std::vector<double> stats;
@@ -567,7 +571,7 @@ class MixedEnds {
   std::optional<VecEnv> env_, own_env_;
   std::unique_ptr<Algorithm> learner_, own_, copy_;
   std::map<std::string, MatD, std::less<>> w_;
-  int K_ = 0;
+  int K_ = 0, round_ = 0;
   double gamma_ = 0;
   std::vector<int> o_prev_ = std::vector<int>(kWorkers, 0);
   std::vector<Sample> episodes_[kWorkers];  // IOPG: of the running episodes

@@ -79,6 +79,29 @@ TEST(OptionUsage, IsTheSameWhereverRolloutsCutIt) {
   }
 }
 
+TEST(Statistics, OfOptionsAreOfTheStepsSinceTheUpdateBefore) {
+  for (const AlgorithmEntry& method : AlgorithmRegistry()) {
+    const RunConfig config = SmallConfig(method.id, Fidelity::kPaper);
+    VecEnv env = PointTask(config.workers, /*time_limit=*/5);
+    const auto algorithm = MakeRunAlgorithm(config, env.Spec());
+    const std::vector<std::string> names = algorithm->StatNames();
+    std::vector<Episode> episodes;
+    for (int update = 0; update < 3; ++update) {
+      const std::int64_t before = env.TotalSteps();
+      algorithm->Collect(env, episodes);
+      const double steps = double(env.TotalSteps() - before);
+      const std::vector<Ratio>& stats = algorithm->Update();
+      double used = 0;
+      for (std::size_t i = 0; i < names.size(); ++i) {
+        if (!names[i].starts_with("usage_")) continue;
+        EXPECT_EQ(stats[i].n, steps) << method.id << ", " << names[i] << ", update " << update;
+        used += stats[i].sum;
+      }
+      EXPECT_EQ(used, method.id == "ppo" ? 0 : steps) << method.id << ", update " << update;
+    }
+  }
+}
+
 TEST(Statistics, AreAsManyAsTheirNames) {
   for (const AlgorithmEntry& method : AlgorithmRegistry()) {
     const RunConfig config = SmallConfig(method.id, Fidelity::kPaper);

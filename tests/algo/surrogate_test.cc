@@ -32,6 +32,8 @@ TEST(ClippedSurrogate, StopsAGoodActionAtTheUpperEdgeOnly) {
   EXPECT_EQ(above.dlogp(0), 0);
   EXPECT_NEAR(below.terms.surrogate, -1, 1e-6);
   EXPECT_NEAR(below.dlogp(0), -1, 1e-6);
+  EXPECT_EQ(above.terms.clip_fraction, 1);
+  EXPECT_EQ(below.terms.clip_fraction, 1) << "outside, though its gradient goes on";
 }
 
 TEST(ClippedSurrogate, StopsABadActionAtTheLowerEdgeOnly) {
@@ -40,6 +42,8 @@ TEST(ClippedSurrogate, StopsABadActionAtTheLowerEdgeOnly) {
   EXPECT_NEAR(above.dlogp(0), 3, 1e-6);
   EXPECT_NEAR(below.terms.surrogate, 1.5, 1e-6);  // 0.75 * 2
   EXPECT_EQ(below.dlogp(0), 0);
+  EXPECT_EQ(above.terms.clip_fraction, 1) << "outside, though its gradient goes on";
+  EXPECT_EQ(below.terms.clip_fraction, 1);
 }
 
 TEST(ClippedSurrogate, AveragesOverTheBatch) {

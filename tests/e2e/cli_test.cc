@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <sstream>
 #include <string>
+#include <tuple>
 
 #include "base/csv.h"
 #include "base/files.h"
@@ -69,6 +71,19 @@ TEST_F(Program, ListsNameTasksMethodsAndSwitches) {
   const std::string switches = Run("list switches").out;
   EXPECT_NE(switches.find("o2v_dropout"), std::string::npos);
   EXPECT_NE(switches.find("[0, 0.9]"), std::string::npos) << "the values that it takes";
+  // Columns switch, paper, released.
+  for (const auto& [name, paper, released] : {std::tuple{"timelimit", "paper", "released"},
+                                              {"o2v_dropout", "0", "0.2"},
+                                              {"adv_std_eps", "1e-08", "0"},
+                                              {"o2v_freeze", "paper", "released"},
+                                              {"contact_forces", "off", "off"}}) {
+    std::istringstream row(switches.substr(switches.find(std::string("\n") + name)));
+    std::string cells[3];
+    row >> cells[0] >> cells[1] >> cells[2];
+    EXPECT_EQ(cells[0], name);
+    EXPECT_EQ(cells[1], paper) << name;
+    EXPECT_EQ(cells[2], released) << name;
+  }
 }
 
 TEST_F(Program, ParamsPrintsThePapersRatio) {
@@ -108,6 +123,36 @@ TEST_F(Program, EvaluatesACheckpointRepeatably) {
   EXPECT_EQ(a.out, b.out);
   EXPECT_NE(a.out, Run(eval + "--episodes 2 --seed 5 --action mean").out);
   EXPECT_EQ(Run(eval + "--algo option2vec").code, 2) << "the file says ppo";
+}
+
+TEST_F(Program, APolicyIsWhatItsFileSays) {
+  ASSERT_EQ(Train("--out run").code, 0);
+  WriteFileAtomically(dir_ / "in.csv", "s0,s1,s2,s3,o_prev,init,o\n0,0,0,0,0,1,0\n");
+  for (const std::string command :
+       {"eval --checkpoint run/last.ckpt --episodes 1",
+        "forward --checkpoint run/last.ckpt --input in.csv --out o.csv"}) {
+    EXPECT_EQ(Run(command + " --algo ppo --fidelity paper").code, 0) << command;
+    for (const std::string other : {" --fidelity released", " --algo oc"}) {
+      const Outcome outcome = Run(command + other);
+      EXPECT_EQ(outcome.code, 2) << command << other;
+      EXPECT_NE(outcome.err.find("run/last.ckpt: made with '"), std::string::npos) << outcome.err;
+    }
+  }
+}
+
+TEST_F(Program, RecordsAFinishedRunAnew) {
+  // 1100 steps are asked for, 1200 made: the record ends where the run was meant to.
+  ASSERT_EQ(Run("train --task InvertedPendulum-v2 --algo ppo --steps 1100 --set rollout=300 "
+                "--out run")
+                .code,
+            0);
+  const std::string csv = ReadFile(dir_ / "run.csv"), json = ReadFile(dir_ / "run.json");
+  EXPECT_NE(csv.find("\n1100,"), std::string::npos) << csv;
+  fs::remove(dir_ / "run.csv");
+  fs::remove(dir_ / "run.json");
+  ASSERT_EQ(Run("record run").code, 0);
+  EXPECT_EQ(ReadFile(dir_ / "run.csv"), csv);
+  EXPECT_EQ(ReadFile(dir_ / "run.json"), json);
 }
 
 TEST_F(Program, WritesNetworkOutputs) {
@@ -229,6 +274,16 @@ TEST_F(Program, JobsRunThenDisappearThenSummarise) {
   EXPECT_NE(
       ReadFile(dir_ / "results/tiny/summary.csv").find("paper,InvertedPendulum-v2,ppo,1024,2,"),
       std::string::npos);
+  // A damaged record does not count, and whoever lists runs says so.
+  const std::string record = "results/tiny/paper/InvertedPendulum-v2/ppo/seed-001.json";
+  WriteFileAtomically(dir_ / record, "{");
+  for (const std::string command :
+       {"summary results/tiny", "jobs tiny.toml", "progress tiny.toml"}) {
+    const Outcome damaged = Run(command);
+    EXPECT_EQ(damaged.code, 0) << command;
+    EXPECT_TRUE(damaged.err.starts_with(record + ": ")) << command << ": " << damaged.err;
+    EXPECT_TRUE(damaged.err.ends_with("\n1 records refused\n")) << command << ": " << damaged.err;
+  }
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <functional>
 #include <limits>
+#include <utility>
 
 #include "base/check.h"
 #include "env/task_helpers.h"
@@ -160,6 +161,25 @@ TEST(Divergence, OfPositionAndAccelerationIsNamedToo) {
   task.Reset();
   task.env->data().qfrc_applied[3] = 1e14;  // [N m]
   EXPECT_NE(MessageOf([&] { task.StepAtRandom(); }).find("BADQACC"), std::string::npos);
+}
+
+TEST(Divergence, EveryWarningOfAChangedStateIsOne) {
+  // What the simulator repairs or drops by itself; it goes on counting where it finds a number.
+  for (const auto& [type, name] : {std::pair{mjWARN_INERTIA, "INERTIA"},
+                                   {mjWARN_CONTACTFULL, "CONTACTFULL"},
+                                   {mjWARN_CNSTRFULL, "CNSTRFULL"},
+                                   {mjWARN_BADQPOS, "BADQPOS"},
+                                   {mjWARN_BADQVEL, "BADQVEL"},
+                                   {mjWARN_BADQACC, "BADQACC"},
+                                   {mjWARN_BADCTRL, "BADCTRL"}}) {
+    TaskUnderTest task("Hopper-v2");
+    task.Reset();
+    task.env->data().warning[type] = {/*lastinfo=*/7, /*number=*/1};
+    EXPECT_EQ(MessageOf([&] { task.StepAtRandom(); }),
+              Concat("Hopper-v2: simulator warning ", name, " (7) at step 1 of the episode"));
+    task.Reset();  // forgets it
+    EXPECT_EQ(MessageOf([&] { task.StepAtRandom(); }), "");
+  }
 }
 
 TEST(Divergence, ANonFiniteResetIsReported) {

@@ -2,6 +2,7 @@
 
 #include "base/check.h"
 #include "env/env.h"
+#include "env/pairs.h"
 
 namespace o2v {
 namespace {
@@ -42,6 +43,24 @@ TEST(EnvRegistry, HoldsAllTasksWithTheirFacts) {
 TEST(EnvRegistry, EveryLineMakesTheTaskOfItsName) {
   for (const EnvEntry& entry : EnvRegistry()) {
     EXPECT_EQ(entry.make(EnvOptions{}, entry.time_limit)->Spec().id, entry.id);
+  }
+}
+
+TEST(Pairs, AreThoseOfTheSpecInTheirOrder) {
+  // Source: spec E.4.
+  const std::vector<std::pair<std::string, std::string>> expected = {
+      {"CartPole", "dm-cartpole-balance,dm-cartpole-balance_sparse"},
+      {"Reacher", "dm-reacher-easy,dm-reacher-hard"},
+      {"Cheetah", "dm-cheetah-run,dm-cheetah-backward"},
+      {"Fish", "dm-fish-upright,dm-fish-downleft"},
+      {"Walker1", "dm-walker-squat,dm-walker-stand"},
+      {"Walker2", "dm-walker-walk,dm-walker-backward"}};
+  ASSERT_EQ(PairRegistry().size(), expected.size());
+  for (const auto& [name, tasks] : expected) {
+    const std::vector<std::string> ids = SplitTasks(name);
+    EXPECT_EQ(JoinTasks(ids), tasks) << name;
+    EXPECT_EQ(TasksName(ids), name);
+    EXPECT_EQ(TasksName({ids.at(1), ids.at(0)}), ids[1] + "," + ids[0]) << "another run";
   }
 }
 

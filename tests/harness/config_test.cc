@@ -200,6 +200,35 @@ TEST(ResolveRun, ConditionalTablesHoldForTheirFidelityMethodOrTaskOnly) {
   EXPECT_EQ(WithConfig(Request("ppo", "Hopper-v2", "released"), file).steps, 4);
 }
 
+TEST(ResolveRun, OfTwoConditionalTablesTheNarrowerOneWins) {
+  // The suite, several tasks, the fidelity, the method, the task: all of them hold for this run.
+  const std::vector<std::string> tables = {"dm", "transfer", "released", "ppo", "Cheetah"};
+  const RunRequest request = Request("ppo", "Cheetah", "released");
+  for (std::size_t a = 0; a < tables.size(); ++a) {
+    for (std::size_t b = a + 1; b < tables.size(); ++b) {
+      const std::string wide = tables[a] + " = {hidden = 10}\n",
+                        narrow = tables[b] + " = {hidden = 20}\n";
+      for (const std::string& file : {wide + narrow, narrow + wide}) {
+        EXPECT_EQ(WithConfig(request, "[algo.ppo]\n" + file).hyper.Int("hidden"), 20) << file;
+      }
+    }
+  }
+}
+
+TEST(ResolveRun, ANumberOfAFidelityIsSetByItsName) {
+  for (const char* fidelity : {"paper", "released"}) {
+    RunRequest request = Request("option2vec", "Hopper-v2", fidelity);
+    request.set = {"o2v_dropout=released", "adv_std_eps=released"};
+    const Switches released = ResolveRun(request).switches;
+    EXPECT_EQ(released.o2v_dropout, 0.2) << fidelity;
+    EXPECT_EQ(released.adv_std_eps, 0) << fidelity;
+    request.set = {"o2v_dropout=paper", "adv_std_eps=paper"};
+    const Switches paper = ResolveRun(request).switches;
+    EXPECT_EQ(paper.o2v_dropout, 0) << fidelity;
+    EXPECT_EQ(paper.adv_std_eps, 1e-8) << fidelity;
+  }
+}
+
 TEST(ResolveRun, SectionsOfOtherMethodsAreLeftAlone) {
   EXPECT_EQ(
       WithConfig(Request("ppo", "Ant-v2"), "[algo.option2vec]\nhidden = 5\n").hyper.Int("hidden"),

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "fake_run.h"
 #include "harness/checkpoint.h"
@@ -78,6 +79,36 @@ TEST_F(Evaluation, ActsWithTheDrawnOptionClippedToTheControlRange) {
         e.length == 2 ? (-3 + std::sqrt(-1 - 2 * e.ret)) / 2 : -2 + std::sqrt((-e.ret - 2) / 3);
     EXPECT_EQ(e.length, x0 > 0 ? 2 : 3) << x0;
     EXPECT_LE(std::abs(x0), 1);
+  }
+}
+
+TEST_F(Evaluation, ClipsToTheRangeOfTheTaskWhateverThatIs) {
+  // Keeps the actions.
+  struct Ranged final : Env {
+    explicit Ranged(double low, double high) {
+      spec = FakeEnv().Spec();
+      spec.a_low = {low};
+      spec.a_high = {high};
+    }
+    const EnvSpec& Spec() const override { return spec; }
+    void Reset(Rng& rng, std::span<double> obs) override { env.Reset(rng, obs); }
+    StepResult Step(std::span<const double> a, std::span<double> obs) override {
+      actions.insert(a[0]);
+      return env.Step(a, obs);
+    }
+    void Visit(StateVisitor&, const std::string&) override {}
+    EnvSpec spec;
+    FakeEnv env;
+    std::set<double> actions;
+  };
+  algorithm_.Params()[0]->value.setZero();
+  for (const auto& [low, high] : {std::pair{-3.0, 0.4}, {-0.25, 5.0}}) {
+    for (const double mu : {-100.0, 100.0}) {
+      Ranged env(low, high);
+      algorithm_.Params()[1]->value.setConstant(Real(mu));
+      Evaluate(algorithm_, normalizer_, env, 3, /*sample_action=*/true, 5);
+      EXPECT_EQ(env.actions, (std::set<double>{mu < 0 ? low : high}));
+    }
   }
 }
 

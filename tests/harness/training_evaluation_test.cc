@@ -87,6 +87,17 @@ TEST_F(TrainingEvaluation, IsOfThePolicyThatTheUpdateLeft) {
   for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(evals.At(6 + i, 2), expected[i].ret);
 }
 
+TEST_F(TrainingEvaluation, StandsAtTheStepOfItsUpdate) {
+  // Updates every 10 steps: the first ones at or beyond 35, 70, 105, 140 and 175.
+  RunConfig config = FakeConfig();
+  config.eval_every = 35;
+  Run(config, FakeParts(config), "run");
+  const CsvTable evals = ReadCsv(dir_ / "run" / "evals.csv");
+  ASSERT_EQ(evals.Rows(), 10u);
+  const std::vector<double> steps = {40, 70, 110, 140, 180};
+  for (std::size_t row = 0; row < 10; ++row) EXPECT_EQ(evals.At(row, 0), steps[row / 2]);
+}
+
 TEST_F(TrainingEvaluation, IsOnTheTaskOfTheMoment) {
   // 1000 more reward a step on the second task, from the update at 110 steps on.
   struct SecondTask final : Env {
