@@ -243,20 +243,22 @@ TEST(DmCartpole, NoiseIsDrawnInTheOrderOfTheState) {
   }
 }
 
-/// Least, largest and mean of what it is shown.
+/// Least, largest, sum and sum of squares of what it is shown.
 struct Range {
-  double least = INFINITY, most = -INFINITY, sum = 0;
+  double least = INFINITY, most = -INFINITY, sum = 0, squares = 0;
   int n = 0;
   void Add(double x) {
     least = std::min(least, x);
     most = std::max(most, x);
     sum += x;
+    squares += x * x;
     ++n;
   }
 };
 
-// Of 4000 draws the extremes lie within 1 % of the ends, and the mean of the middle within 5 sigma
-// (width / sqrt(12 * 4000)), but for one seed in a million.
+// Of 4000 draws the extremes lie within 1 % of the ends, and two means within 5 sigma: that of the
+// draws of the middle (sigma width / sqrt(12 * 4000)), that of the squares about the middle of
+// width^2 / 12 (sigma width^2 / sqrt(180 * 4000)). One seed in a million fails.
 constexpr int kResets = 4000;
 void ExpectUniform(const Range& x, double low, double high, const std::string& what) {
   const double width = high - low;
@@ -264,7 +266,11 @@ void ExpectUniform(const Range& x, double low, double high, const std::string& w
   EXPECT_LE(x.most, high) << what;
   EXPECT_LT(x.least, low + 0.01 * width) << what;
   EXPECT_GT(x.most, high - 0.01 * width) << what;
-  EXPECT_NEAR(x.sum / x.n, (low + high) / 2, 5 * width / std::sqrt(12.0 * kResets)) << what;
+  const double middle = (low + high) / 2, mean = x.sum / x.n;
+  EXPECT_NEAR(mean, middle, 5 * width / std::sqrt(12.0 * kResets)) << what;
+  EXPECT_NEAR(x.squares / x.n - 2 * middle * mean + middle * middle, width * width / 12,
+              5 * width * width / std::sqrt(180.0 * kResets))
+      << what;
 }
 
 TEST(DmReacher, JointsFillTheirRangesAndTargetsARing) {
