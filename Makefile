@@ -71,6 +71,7 @@ report: deps  ## tables, claims, figures: results/REPORT.md, report.html (EXPERI
 	@$(O2V) params --csv > results/params.csv.new && mv results/params.csv.new results/params.csv
 	@$(O2V) list switches > results/switches.txt.new && mv results/switches.txt.new results/switches.txt
 	@$(PYTHON) -m plots.report $(CHOICE) $(if $(CHOICE),--out results/$(firstword $(EXPERIMENTS)))
+	@$(if $(CHOICE),,$(PYTHON) -m plots.front)
 
 plots: deps  ## the figures alone: plots/*.svg and *.png
 	@for script in plots/fig_*.py; do $(PYTHON) -m plots.$$(basename $$script .py) || exit; done
