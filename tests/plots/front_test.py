@@ -25,7 +25,7 @@ class FrontTest(unittest.TestCase):
         self.results = with_reference(Path(folder.name) / "results")
 
     def panels(self):
-        panels = front.draw(self.results).figure.axes
+        panels = front.draw(self.results).axes
         return {panel.get_title().split("\n")[0]: panel for panel in panels}
 
     def test_shows_means_of_released_runs(self):
