@@ -76,10 +76,11 @@ report: deps  ## tables, claims, figures: results/REPORT.md, report.html (EXPERI
 plots: deps  ## the figures alone: plots/*.svg and *.png
 	@for script in plots/fig_*.py; do $(PYTHON) -m plots.$$(basename $$script .py) || exit; done
 
-lint: deps  ## formatting, include layering, cited sections of docs/
+lint: deps  ## formatting, include layering, cited sections, links and lengths of the pages
 	@find src tests bench -name '*.cc' -o -name '*.h' | xargs clang-format --dry-run -Werror
 	@scripts/lint_layers.sh
 	@scripts/lint_spec.sh
+	@scripts/lint_links.sh
 
 lint-tidy: build  ## clang-tidy on the files changed since BASE=HEAD
 	@scripts/lint_tidy.sh $(or $(BASE),HEAD)
