@@ -60,7 +60,7 @@ std::vector<std::string> Names(const std::string& method) {
 Fidelity ParseFidelity(const std::string& name) {
   if (name == "paper") return Fidelity::kPaper;
   if (name == "released") return Fidelity::kReleased;
-  throw ConfigError(Concat("unknown fidelity '", name, "'; it is 'paper' or 'released'"));
+  throw ConfigError(Concat("unknown fidelity '", name, "'; expected 'paper' or 'released'"));
 }
 
 std::string ToString(Fidelity fidelity) {

@@ -58,7 +58,7 @@ void ReadHeader(std::string_view line, CsvTable& table) {
                                ": expected a name, got ", Quoted(name)));
     }
     if (std::count(table.columns.begin(), table.columns.end(), name) != 0) {
-      throw ConfigError(Concat(table.path, ":1: column ", Quoted(name), " stands there twice"));
+      throw ConfigError(Concat(table.path, ":1: column ", Quoted(name), " appears twice"));
     }
     table.columns.push_back(name);
     if (last) return;
@@ -80,7 +80,8 @@ double ReadNumber(std::string_view text, const CsvTable& table, std::size_t row,
 std::size_t CsvTable::Column(std::string_view name) const {
   const auto found = std::find(columns.begin(), columns.end(), name);
   if (found == columns.end()) {
-    throw ConfigError(Concat(path, ":1: no column '", name, "' among ", columns.size()));
+    throw ConfigError(
+        Concat(path, ":1: no column '", name, "' among the ", columns.size(), " columns"));
   }
   return static_cast<std::size_t>(found - columns.begin());
 }

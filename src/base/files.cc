@@ -111,7 +111,7 @@ fs::path FolderPath(const fs::path& dir) {
   }
   if (!path.has_filename()) path = path.parent_path();
   if (!path.has_filename())
-    throw ConfigError(Concat("'", dir.string(), "': not a folder of a run"));
+    throw ConfigError(Concat("'", dir.string(), "': not the folder of a run"));
   return path;
 }
 

@@ -84,10 +84,12 @@ struct RunOptions {
   std::optional<std::string> config;
 
   void Add(CLI::App& app) {
-    app.add_option("--task", request.task, "task id or pair, see `list tasks`; A,B: A, then B");
-    app.add_option("--algo", request.algorithm, "method id, see `list algorithms`");
+    app.add_option("--task", request.task,
+                   "task id or pair (see `list tasks`); A,B: first A, then B");
+    app.add_option("--algo", request.algorithm, "method id (see `list algorithms`)");
     app.add_option("--fidelity", request.fidelity, "paper (default) or released");
-    app.add_option("--set", request.set, "key=value: number of the method or run, or a switch")
+    app.add_option("--set", request.set,
+                   "key=value: a switch, or a number of the method or run; repeatable")
         ->allow_extra_args(false);
   }
 };
@@ -126,11 +128,12 @@ void ListSwitches() {
 }
 
 void AddList(CLI::App& app) {
-  CLI::App* list = app.add_subcommand("list", "what there is: tasks, algorithms or switches");
+  CLI::App* list = app.add_subcommand("list", "list tasks, algorithms or switches");
   list->require_subcommand(1);
-  list->add_subcommand("tasks", "task ids, sizes, time limits")->callback(ListTasks);
+  list->add_subcommand("tasks", "task ids with sizes and time limits; pairs of tasks")
+      ->callback(ListTasks);
   list->add_subcommand("algorithms", "method ids")->callback(ListAlgorithms);
-  list->add_subcommand("switches", "differences between paper and released code, one by one")
+  list->add_subcommand("switches", "every difference between `paper` and `released`")
       ->callback(ListSwitches);
   list->footer("Example:\n  option2vec list switches");
 }
@@ -143,15 +146,16 @@ void AddTrain(CLI::App& app) {
     bool resume = false;
   };
   auto opt = std::make_shared<Options>();
-  CLI::App* train = app.add_subcommand("train", "one run into one folder");
+  CLI::App* train = app.add_subcommand("train", "train one run into one folder");
   opt->Add(*train);
   AddWhole(*train, "--seed", opt->request.seed, 0, kMaxWhole,
            "seed of all random streams (default 0)");
-  AddWhole(*train, "--steps", opt->request.steps, 1, kMaxWhole, "environment steps of all workers");
+  AddWhole(*train, "--steps", opt->request.steps, 1, kMaxWhole,
+           "environment steps, summed over workers");
   train->add_option("--out", opt->out, "folder of the run")->required();
   train->add_option("--config", opt->config,
-                    "a .toml file, or the name of an embedded one, below --set and the options");
-  train->add_flag("--resume", opt->resume, "go on with an unfinished run, or start a new one");
+                    "a .toml file, or the name of a built-in one; the other options win over it");
+  train->add_flag("--resume", opt->resume, "continue an unfinished run, or start a new one");
   train->footer(
       "Examples:\n"
       "  option2vec train --task HalfCheetah-v2 --algo option2vec --seed 1 --out runs/a\n"
@@ -167,7 +171,7 @@ void AddTrain(CLI::App& app) {
     hooks.stop = [] { return stop_signal != 0; };
     const bool terminal = ::isatty(STDERR_FILENO) == 1;
     if (Train(config, opt->out, opt->resume, std::cerr, terminal, hooks) == RunStatus::kStopped) {
-      throw Error(opt->out + ": stopped by a signal; go on with --resume");
+      throw Error(opt->out + ": stopped by a signal; use --resume to continue");
     }
   });
 }
@@ -189,7 +193,7 @@ LoadedPolicy LoadPolicyFile(const std::string& checkpoint, RunRequest request) {
     const RunConfig own = ParseRunConfig(config->second, checkpoint);
     auto agree = [&](const std::optional<std::string>& given, const std::string& is) {
       if (given && *given != is) {
-        throw ConfigError(Concat(checkpoint, ": made with '", is, "', not '", *given, "'"));
+        throw ConfigError(Concat(checkpoint, ": trained with '", is, "', not '", *given, "'"));
       }
     };
     agree(request.algorithm, own.algorithm);
@@ -214,18 +218,21 @@ void AddEval(CLI::App& app) {
     std::uint64_t seed = 0;
   };
   auto opt = std::make_shared<Options>();
-  CLI::App* eval = app.add_subcommand("eval", "returns of a trained policy");
-  eval->add_option("--checkpoint", opt->checkpoint, "last.ckpt of a run, or a foreign file")
+  CLI::App* eval =
+      app.add_subcommand("eval", "run episodes with a trained policy and print their returns");
+  eval->add_option("--checkpoint", opt->checkpoint,
+                   "last.ckpt of a run, or a safetensors file from elsewhere")
       ->required();
   opt->Add(*eval);
-  AddWhole(*eval, "--episodes", opt->episodes, 1, kMaxInt, "whole episodes")->default_str("10");
-  eval->add_option("--action", opt->action, "sample: from the Gaussian; mean: its mean")
+  AddWhole(*eval, "--episodes", opt->episodes, 1, kMaxInt, "number of whole episodes")
+      ->default_str("10");
+  eval->add_option("--action", opt->action, "sample the Gaussian, or take its mean")
       ->check(CLI::IsMember({"sample", "mean"}))
       ->capture_default_str();
-  AddWhole(*eval, "--seed", opt->seed, 0, kMaxWhole, "of the episodes")->default_str("0");
+  AddWhole(*eval, "--seed", opt->seed, 0, kMaxWhole, "seed of the episodes")->default_str("0");
   eval->footer(
-      "Task, method, fidelity and --set are needed only where the file does not say them. After a\n"
-      "transfer run --task chooses one of its tasks; the last one is the default.\n"
+      "--task, --algo, --fidelity and --set are needed only when the file does not name them.\n"
+      "After a transfer run, --task chooses one of its tasks (default: the last one).\n"
       "Options are always sampled.\n"
       "Examples:\n"
       "  option2vec eval --checkpoint runs/a/last.ckpt --task HalfCheetah-v2 --action mean\n"
@@ -251,15 +258,18 @@ void AddForward(CLI::App& app) {
     std::string checkpoint, input, output;
   };
   auto opt = std::make_shared<Options>();
-  CLI::App* forward = app.add_subcommand("forward", "what the networks say at given inputs");
-  forward->add_option("--checkpoint", opt->checkpoint, "last.ckpt of a run, or a foreign file")
+  CLI::App* forward =
+      app.add_subcommand("forward", "compute the networks' outputs at given inputs");
+  forward
+      ->add_option("--checkpoint", opt->checkpoint,
+                   "last.ckpt of a run, or a safetensors file from elsewhere")
       ->required();
   opt->Add(*forward);
   forward->add_option("--input", opt->input, "CSV: s0.. (normalised state), o_prev, init, o")
       ->required();
   forward->add_option("--out", opt->output, "CSV: P0.., mu0.., sigma0.., q0..")->required();
   forward->footer(
-      "Options count from 0; o is fed to action net and critic. Dropout is off.\n"
+      "Options count from 0. Action net and critic get option o. Dropout is off.\n"
       "Example:\n"
       "  option2vec forward --checkpoint runs/a/last.ckpt --input states.csv --out outputs.csv");
   forward->callback([opt] {
@@ -277,37 +287,39 @@ void AddInterpret(CLI::App& app) {
   };
   auto opt = std::make_shared<Options>();
   CLI::App* interpret =
-      app.add_subcommand("interpret", "what the dimensions of Option2Vec's embedding do");
+      app.add_subcommand("interpret", "measure what each dimension of Option2Vec's embedding does");
   interpret->add_option("run", opt->run, "folder of a run, or a checkpoint file")->required();
   opt->Add(*interpret);
-  AddWhole(*interpret, "--episodes", opt->episodes, 1, kMaxInt, "whole episodes")
+  AddWhole(*interpret, "--episodes", opt->episodes, 1, kMaxInt, "number of whole episodes")
       ->default_str("10");
   AddReal(*interpret, "--delta", opt->delta, std::numeric_limits<double>::min(), "positive",
-          "by which a dimension is perturbed")
+          "change of a dimension")
       ->default_str(Decimal(kDelta));
-  AddWhole(*interpret, "--seed", opt->seed, 0, kMaxWhole, "of the episodes")->default_str("0");
+  AddWhole(*interpret, "--seed", opt->seed, 0, kMaxWhole, "seed of the episodes")->default_str("0");
   interpret->add_option(
       "--out", opt->out,
-      "CSV (default results/interpret/<fidelity>/<task>/option2vec/seed-NNN.csv "
-      "of the run's own);\nhow it was made stands beside it, with the ending .json. Files that are "
-      "there are replaced\nonly where an earlier interpretation wrote them");
+      "CSV (default results/interpret/<fidelity>/<task>/option2vec/seed-NNN.csv);\n"
+      "a .json file beside it says how it was made. Existing files are replaced only\n"
+      "if `interpret` wrote them");
   interpret->footer(
-      "A row a dimension d: W_o(d, k); the mean over the visited states of d mu_a / d o_hat_d, "
-      "o_hat the\nembedding of the option executed there; the mean change of mu_a by "
-      "o_hat_d + delta.\n"
-      "The networks of a run over two tasks are those that the last one left, so the default is "
-      "to act\non it; --task chooses the other.\n"
+      "Writes one row per dimension d: W_o(d, k); the mean of d mu_a / d o_hat_d over visited "
+      "states;\n"
+      "the mean change of mu_a when o_hat_d grows by delta. o_hat is the executed option's "
+      "embedding.\n"
+      "After a transfer run, --task chooses one of its tasks (default: the last one). The "
+      "networks\n"
+      "are those at the end of the run.\n"
       "Example:\n  option2vec interpret runs/a --episodes 20 --out a.csv");
   interpret->callback([opt] {
     const std::filesystem::path file = FindCheckpoint(opt->run);
     LoadedPolicy policy = LoadPolicyFile(file.string(), opt->request);
     if (!policy.algorithm->Embedding()) {
-      throw ConfigError(Concat(file.string(), ": made by ", policy.config.algorithm,
+      throw ConfigError(Concat(file.string(), ": trained by ", policy.config.algorithm,
                                ", whose options have no embedding"));
     }
     const Metadata metadata = ReadMetadata(file);
     if (opt->out.empty() && !metadata.contains("config")) {
-      throw ConfigError(file.string() + ": does not say of which run it is; --out is needed");
+      throw ConfigError(file.string() + ": does not name its run; give --out");
     }
     const std::string& task = policy.env->Spec().id;
     const std::filesystem::path out =
@@ -330,8 +342,8 @@ void AddInterpret(CLI::App& app) {
 
 void AddParams(CLI::App& app) {
   auto csv = std::make_shared<bool>(false);
-  CLI::App* params = app.add_subcommand("params", "parameters by task, method and width");
-  params->add_flag("--csv", *csv, "as CSV");
+  CLI::App* params = app.add_subcommand("params", "count parameters by task, method and width");
+  params->add_flag("--csv", *csv, "print CSV");
   params->footer("Example:\n  option2vec params --csv");
   params->callback([csv] {
     const auto rows = ParamTable();
@@ -347,19 +359,20 @@ void AddReplay(CLI::App& app, int& exit_code) {
     double tolerance = 1e-9;  // spec E.6
   };
   auto opt = std::make_shared<Options>();
-  CLI::App* replay = app.add_subcommand("replay", "a recorded trajectory against our simulation");
+  CLI::App* replay =
+      app.add_subcommand("replay", "compare a recorded trajectory with our simulation");
   replay->add_option("--task", opt->task, "task id")->required();
   replay
       ->add_option("--trajectory", opt->trajectory,
-                   "CSV: step, ctrl0.., qpos0.., qvel0.., and perhaps reward, terminated, obs0..,\n"
+                   "CSV: step, ctrl0.., qpos0.., qvel0..; optionally reward, terminated, obs0..,\n"
                    "target0..")
       ->required();
-  replay->add_option("--out", opt->out, "our trajectory, same columns");
+  replay->add_option("--out", opt->out, "our trajectory, with the same columns");
   AddReal(*replay, "--tolerance", opt->tolerance, 0, "non-negative",
-          "largest |a - b| / max(1, |b|)")
+          "largest allowed |a - b| / max(1, |b|)")
       ->default_str(Decimal(opt->tolerance));
   replay->footer(
-      "A row with step 0 is injected as the state. Exit code 1 on FAIL.\n"
+      "A row with step 0 sets the state. The exit code is 1 on FAIL.\n"
       "Example:\n  option2vec replay --task Hopper-v2 --trajectory hopper.csv --out ours.csv");
   replay->callback([opt, &exit_code] {
     const Deviation worst = ReplayFile(opt->task, opt->trajectory, opt->out);
@@ -377,11 +390,11 @@ void AddReplay(CLI::App& app, int& exit_code) {
 
 void AddRecord(CLI::App& app) {
   auto runs = std::make_shared<std::vector<std::string>>();
-  CLI::App* record = app.add_subcommand("record", "writes the records of finished runs anew");
+  CLI::App* record = app.add_subcommand("record", "rewrite the records of finished runs");
   record->add_option("runs", *runs, "folders of runs")->required();
   record->footer(
-      "`train` writes a record when a run ends; this is for runs of before a record held all that "
-      "it\nholds now.\n"
+      "`train` writes the record when a run ends. This command renews records of an older "
+      "version.\n"
       "Example:\n  option2vec record results/quick/paper/*/ppo/seed-000");
   record->callback([runs] {
     for (const std::string& run : *runs) {
@@ -418,14 +431,17 @@ struct GridOptions {
   std::optional<std::string> seeds;
 
   void Add(CLI::App& app) {
-    app.add_option("experiments", query.configs, "a .toml file, or quick, single_task, ...")
+    app.add_option("experiments", query.configs,
+                   "a .toml file, or a built-in suite: quick, single_task, ...")
         ->required();
     app.add_option("--tasks", query.tasks,
-                   "instead of the experiment's, A,B; of several experiments, those to take")
+                   "A,B instead of the experiment's; with several experiments: the tasks to take")
         ->delimiter(',');
-    app.add_option("--algos", query.algorithms, "instead of the experiment's")->delimiter(',');
-    app.add_option("--fidelity", query.fidelities, "likewise")->delimiter(',');
-    app.add_option("--seeds", seeds, "likewise, such as 0-4,7");
+    app.add_option("--algos", query.algorithms, "methods instead of the experiment's")
+        ->delimiter(',');
+    app.add_option("--fidelity", query.fidelities, "fidelities instead of the experiment's")
+        ->delimiter(',');
+    app.add_option("--seeds", seeds, "seeds instead of the experiment's, such as 0-4,7");
     app.add_option("--results", query.results, "folder of all results")->capture_default_str();
   }
   std::vector<Job> List() {
@@ -437,11 +453,11 @@ struct GridOptions {
 void AddJobs(CLI::App& app, const std::string& program) {
   auto opt = std::make_shared<GridOptions>();
   opt->query.program = program;
-  CLI::App* jobs = app.add_subcommand("jobs", "the runs of experiments, one command a line");
+  CLI::App* jobs = app.add_subcommand("jobs", "list the runs of experiments, one command per line");
   opt->Add(*jobs);
   jobs->footer(
-      "Commands start a run or go on with it; finished and diverged runs are left out, and those "
-      "that an\nolder revision of a method's code made are named on standard error.\n"
+      "A command starts its run or continues it. Finished and diverged runs are left out.\n"
+      "Those made by an older revision of the method are named on standard error.\n"
       "Example:\n  option2vec jobs quick --seeds 0-4 | xargs -P 2 -d '\\n' -n 1 sh -c");
   jobs->callback([opt] {
     const std::vector<Job> list = opt->List();
@@ -450,7 +466,7 @@ void AddJobs(CLI::App& app, const std::string& program) {
       if (!job.finished) {
         std::cout << job.command << "\n";
       } else if (job.old) {
-        std::cerr << Printable(job.dir.string()) << ": by an older revision of the method\n";
+        std::cerr << Printable(job.dir.string()) << ": made by an older revision of the method\n";
       }
     }
     NameRefused(RefusedOf(list));
@@ -462,11 +478,13 @@ void AddProgress(CLI::App& app) {
     int at_once = 1;
   };
   auto opt = std::make_shared<Options>();
-  CLI::App* progress = app.add_subcommand("progress", "how far the runs of experiments have come");
+  CLI::App* progress = app.add_subcommand(
+      "progress", "show how many runs of experiments are done and how long the rest takes");
   opt->Add(*progress);
-  AddWhole(*progress, "--at-once", opt->at_once, 1, kMaxInt, "runs at a time")->default_str("1");
+  AddWhole(*progress, "--at-once", opt->at_once, 1, kMaxInt, "number of runs at a time")
+      ->default_str("1");
   progress->footer(
-      "The time left is what finished runs of the same kind took.\n"
+      "The time left is estimated from finished runs of the same kind.\n"
       "Example:\n  option2vec progress single_task transfer --fidelity paper --at-once 2");
   progress->callback([opt] {
     const std::vector<Job> list = opt->List();
@@ -478,10 +496,10 @@ void AddProgress(CLI::App& app) {
 void AddSummary(CLI::App& app) {
   auto folders = std::make_shared<std::vector<std::string>>();
   CLI::App* summary =
-      app.add_subcommand("summary", "table of an experiment's results beside the authors'");
+      app.add_subcommand("summary", "print an experiment's results beside the authors'");
   summary->add_option("experiment", *folders, "results/<experiment>")->required();
   summary->footer(
-      "Also writes <experiment>/summary.csv.\n"
+      "The table also goes into <experiment>/summary.csv.\n"
       "Example:\n  option2vec summary results/quick");
   summary->callback([folders] {
     for (const std::string& folder : *folders) {
@@ -495,9 +513,10 @@ void AddSummary(CLI::App& app) {
 }
 
 int Main(int argc, char** argv) {
-  CLI::App app("Option2Vec and PPO on MuJoCo tasks: reference reproduction.", "option2vec");
+  CLI::App app("Option2Vec and seven rivals on MuJoCo tasks: a reference reproduction.",
+               "option2vec");
   app.require_subcommand(1);
-  app.footer("option2vec <subcommand> --help shows options and examples.");
+  app.footer("`option2vec SUBCOMMAND --help` shows options and examples.");
   app.set_version_flag("--version", VersionText,
                        "commit, compiler, flags, versions, products, libmujoco");
   int exit_code = 0;

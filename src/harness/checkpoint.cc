@@ -126,7 +126,7 @@ json ParseJson(const File& file, std::string_view text) {
     if (event == json::parse_event_t::object_end) open.pop_back();
     if (event == json::parse_event_t::key) {
       const auto name = x.get<std::string>();
-      file.Require(open.back().insert(name).second, "bad header: ", name, " stands there twice");
+      file.Require(open.back().insert(name).second, "bad header: ", name, " appears twice");
     }
     return true;
   });
@@ -278,7 +278,7 @@ class Loader final : public StateVisitor {
 
   void RequireAllSeen() const {
     for (const auto& [name, t] : file_.tensors) {
-      file_.Require(seen_.contains(name), "holds ", name, ", which this run does not have");
+      file_.Require(seen_.contains(name), "contains ", name, ", which this run does not have");
     }
   }
 

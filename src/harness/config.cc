@@ -114,7 +114,7 @@ const toml::table* Section(const ConfigText& file, const toml::table& parent,
                            std::string_view key) {
   const toml::node* node = parent.get(key);
   if (node && !node->is_table()) {
-    throw ConfigError(Concat(Origin(file, *node), ": '", key, "' is a table, written [", key, "]"));
+    throw ConfigError(Concat(Origin(file, *node), ": '", key, "' must be a table, [", key, "]"));
   }
   return node ? node->as_table() : nullptr;
 }
@@ -158,8 +158,8 @@ int ReadFormat(const ConfigText& file, const toml::table& root, int last) {
   if (!node) return 1;
   const std::int64_t format = node->value_exact<std::int64_t>().value_or(0);
   if (format < 1 || format > last) {
-    throw ConfigError(Concat(Origin(file, *node), ": format ", format,
-                             " of configurations: this program reads 1 to ", last));
+    throw ConfigError(Concat(Origin(file, *node), ": configuration format ", format,
+                             "; this program reads 1 to ", last));
   }
   return static_cast<int>(format);
 }
@@ -307,7 +307,7 @@ RunConfig Build(const Layer& layer, const Scope& scope, const Table& known_hyper
     const Scalar& scalar = need(key);
     const std::string word = ToWord(key, scalar);
     if ((key == std::string("task") ? JoinTasks(SplitTasks(word)) : word) != name) {
-      throw ConfigError(Concat(scalar.origin, ": '", key, "' must stand directly in [run]"));
+      throw ConfigError(Concat(scalar.origin, ": '", key, "' must be a plain key of [run]"));
     }
   }
   config.fidelity = ParseFidelity(scope.fidelity);
@@ -554,7 +554,7 @@ Experiment ReadExperiment(const ConfigText& file) {
     if (!node) throw ConfigError(Concat(file.name, ": missing key '", key, "' in [experiment]"));
     const toml::array* list = node->as_array();
     if (!list || list->empty()) {
-      throw ConfigError(Concat(Origin(file, *node), ": '", key, "' must be a list, not empty"));
+      throw ConfigError(Concat(Origin(file, *node), ": '", key, "' must be a non-empty list"));
     }
     for (const toml::node& item : *list) take(ReadScalar(file, key, item));
   };

@@ -117,7 +117,8 @@ std::optional<fs::path> BesideInterpretation(const fs::path& csv) {
 
 void RequireInterpretationPlace(const fs::path& csv) {
   if (csv.extension() == ".json") {
-    throw ConfigError(csv.string() + ": a CSV is written there; .json is the file beside it");
+    throw ConfigError(csv.string() +
+                      ": --out names the CSV file; a .json file is written beside it");
   }
   const auto json = BesideInterpretation(csv);
   if (!json) return;
@@ -126,13 +127,13 @@ void RequireInterpretationPlace(const fs::path& csv) {
     if (!fs::exists(path)) continue;
     const std::string text = ReadFile(path);
     if (path == csv ? !text.starts_with(Concat(kFirstColumn, ",")) : !IsInterpretation(text)) {
-      throw ConfigError(path.string() + ": is not of an interpretation; move it away first");
+      throw ConfigError(path.string() + ": not written by `interpret`; move it away first");
     }
   }
 }
 
 fs::path FindCheckpoint(const fs::path& run) {
-  if (!fs::exists(run)) throw ConfigError(run.string() + ": no such run folder or checkpoint");
+  if (!fs::exists(run)) throw ConfigError(run.string() + ": no such folder or checkpoint");
   if (!fs::is_directory(run)) return run;
   const fs::path path = run / "last.ckpt";
   if (!fs::exists(path)) throw ConfigError(run.string() + ": no last.ckpt in this folder");

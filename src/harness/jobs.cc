@@ -20,7 +20,8 @@ namespace fs = std::filesystem;
 /// a line.
 std::string Quoted(const std::string& word) {
   if (word.find('\n') != std::string::npos) {
-    throw ConfigError(Concat("'", word, "': a line break cannot stand in a line of jobs"));
+    throw ConfigError(
+        Concat("'", word, "' contains a line break; `jobs` prints one command per line"));
   }
   constexpr std::string_view kPlain =
       "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./,:=+@%";
@@ -194,7 +195,7 @@ std::string ToString(const Progress& progress, int at_once) {
   const int left = progress.runs - progress.finished - progress.refused;
   text += Concat(", ", left, " left");
   if (left == 0) return text;
-  if (!progress.cpu_seconds_left) return text + ", time left known after the first";
+  if (!progress.cpu_seconds_left) return text + ", the time left is known after the first run";
   constexpr double kHour = 3600;
   const double hours = *progress.cpu_seconds_left / kHour;
   std::array<char, 160> line{};
@@ -203,7 +204,7 @@ std::string ToString(const Progress& progress, int at_once) {
   text += line.data();
   if (progress.timed < progress.kinds) {
     text += Concat(" (", progress.timed, " of ", progress.kinds,
-                   " kinds of runs timed, the rest guessed from these)");
+                   " kinds of runs measured, the rest estimated from these)");
   }
   return text;
 }

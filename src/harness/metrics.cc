@@ -47,9 +47,9 @@ void CsvLog::Resume() {
         " bytes, but the checkpoint was written after ", bytes_);
   const std::string_view kept(text.data(), static_cast<std::size_t>(bytes_));
   Check(std::bit_cast<std::int64_t>(Fnv1a(kept)) == hash_, path_.string(), ": the first ", bytes_,
-        " bytes are not those that were there when the checkpoint was written");
+        " bytes have changed since the checkpoint was written");
   Check(kept.starts_with(header_ + "\n"), path_.string(), ": its columns are not ", header_,
-        ": it was begun by another version of the program");
+        "; another version of the program began it");
   std::filesystem::resize_file(path_, static_cast<std::uintmax_t>(bytes_));
   AppendToFile(path_, "");  // an error of writing shows before the first step
 }

@@ -134,16 +134,14 @@ std::string Note(const std::vector<ParamRow>& rows) {
                   " %");
   };
   return Concat(
-      "\nh is the width of both hidden layers; Option2Vec has 64 of its own, and embeddings of the "
-      "gym tasks' size\n"
-      "throughout. used: parameters that some stage's loss can reach; the networks allocate more. "
-      "O2V %: Option2Vec\n"
-      "in percent of the line's network, all parameters counted; of paper, then of released, where "
-      "both are one line.\n"
-      "\nThe paper's 15.8 % is the cell HalfCheetah-v2 (S = 17, A = 6), h = 128, released, of the "
-      "option network that\ndac_ppo, ahp_ppo, iopg, ppoc and oc share: ",
-      quotient(128),
-      ", parameters that nothing uses counted on\nboth sides. Against DAC's own width 64 it is ",
+      "\nh is the width of both hidden layers. Option2Vec always has h = 64 and the embedding "
+      "dimension of\n"
+      "the gym tasks. used: parameters that some loss can reach. O2V %: Option2Vec's parameters "
+      "in percent\n"
+      "of the line's; first of paper, then of released, when one line shows both.\n"
+      "\nThe paper's 15.8 % is HalfCheetah-v2 (S = 17, A = 6), h = 128, released, against the "
+      "network that\ndac_ppo, ahp_ppo, iopg, ppoc and oc share: ",
+      quotient(128), ", unused parameters\nincluded. Against DAC's own width 64 it is ",
       quotient(64), ".\n");
 }
 

@@ -194,7 +194,7 @@ void RequirePlace(const fs::path& json, const std::string& experiment, const Run
   try {
     const fs::path method = json.parent_path(), task = method.parent_path();
     const auto agree = [](const fs::path& place, const std::string& content) {
-      Check(place == content, "lies in the place of ", place, ", but is of ", content);
+      Check(place == content, "lies in the place of ", place, ", but belongs to ", content);
     };
     agree(json.filename(), SeedFolder(config.seed) + ".json");
     agree(method.filename(), config.algorithm);
@@ -237,15 +237,15 @@ std::optional<RecordHead> FindRecord(const fs::path& dir, const std::string& con
   std::error_code error;  // a name that is too long is nobody's
   if (!fs::exists(fs::symlink_status(json, error))) return std::nullopt;
   if (const auto csv = RecordPath(dir, ".csv"); !fs::exists(csv, error)) {
-    throw ConfigError(Concat(csv.string(), ": missing; a record is a pair of files, this and ",
-                             json.filename().string(), ": write both with `option2vec record ",
-                             dir.string(), "`, or move the other away to run it again"));
+    throw ConfigError(Concat(csv.string(), ": missing. A record is this file and ",
+                             json.filename().string(), "; rewrite both with `option2vec record ",
+                             dir.string(), "`, or move the other away to repeat the run"));
   }
   const RecordHead head = ReadRecordHead(json);
   if (head.config_text != config &&
       ToToml(ParseRunConfig(head.config_text, json.string(), added)) != config) {
-    throw ConfigError(Concat(json.string(), ": this run was finished with another ",
-                             "configuration; move it away to run it again"));
+    throw ConfigError(Concat(json.string(), ": the record of another configuration; ",
+                             "move it away to repeat the run"));
   }
   return head;
 }
@@ -255,7 +255,7 @@ void RequireRecordPlace(const fs::path& dir, const std::string& config, bool beg
   const fs::path json = RecordPath(dir, ".json"), csv = RecordPath(dir, ".csv");
   const std::size_t longest = json.filename().string().size() + sizeof ".tmp" - 1;
   if (longest > kLongestName) {
-    throw ConfigError(Concat(dir.string(), ": its record's name would have ", longest,
+    throw ConfigError(Concat(dir.string(), ": the name of its record would have ", longest,
                              " bytes, more than ", kLongestName));
   }
   const auto own = [&](const fs::path& path) {
@@ -271,7 +271,7 @@ void RequireRecordPlace(const fs::path& dir, const std::string& config, bool beg
     if (!fs::exists(fs::symlink_status(path, error))) continue;
     if (!begun || !fs::is_regular_file(path) || !own(path)) {
       throw ConfigError(path.string() +
-                        ": is in the place of this run's record; move it away first");
+                        ": the record of this run goes here; move this file away first");
     }
   }
 }

@@ -238,13 +238,14 @@ std::string SummaryTable(const std::vector<SummaryRow>& rows) {
   }
 
   return AlignColumns(table) +
-         "\nReturns: mean of the last 20 training episodes at the step, mean +- std (ddof 0) over "
-         "n\n"
-         "seeds. Authors: their curves at that step, from 1000000 on their return_at_1M; they are "
-         "of\n"
-         "the released code. Left out: runs that diverged before the step, that are too short "
-         "(fewer\n"
-         "than 20 episodes), that an older revision of the method's code made.\n";
+         "\nA return is the mean of the last 20 training episodes at the step; mean +- std "
+         "(divisor "
+         "n)\n"
+         "over n seeds. authors: their curves at that step, or their return_at_1M from 1000000 on. "
+         "Compare\n"
+         "them with `released`. left out: runs that diverged before the step, that have fewer than "
+         "20\n"
+         "episodes (short), or that an older revision of the method made (older).\n";
 }
 
 }  // namespace o2v

@@ -61,7 +61,7 @@ class FolderLock {
     ::close(fd_);
     throw ConfigError(Concat(dir.string(), ": ",
                              error == EWOULDBLOCK
-                                 ? "another process trains in this folder"
+                                 ? "another process is training in this folder"
                                  : "cannot be locked for this process: " + Reason(error)));
   }
   ~FolderLock() { ::close(fd_); }
@@ -84,8 +84,8 @@ void RequireSameConfig(const fs::path& path, const std::string& wanted) {
     if (!more_a && !more_b) return;
     if (more_a && more_b && line_a == line_b) continue;
     if (line_a == line_b + "\r") {
-      throw ConfigError(Concat(path.string(), ":", line, ": ends in CR LF; the run was started ",
-                               "with LF, give the file its line ends back"));
+      throw ConfigError(Concat(path.string(), ":", line, ": ends in CR LF, but the run was ",
+                               "started with LF; restore the line ends"));
     }
     throw ConfigError(Concat(path.string(), ":", line, ": this run was started with '",
                              more_a ? line_a : "(nothing)", "', not '",
@@ -96,7 +96,7 @@ void RequireSameConfig(const fs::path& path, const std::string& wanted) {
 /// What a run that has ended says when it is asked to go on: nothing is left to do.
 RunStatus Ended(const fs::path& dir, RunStatus status, std::ostream& progress) {
   if (status == RunStatus::kDiverged) throw DivergedError(dir.string() + ": this run has diverged");
-  progress << dir.string() << ": this run is done, nothing is left to do" << std::endl;
+  progress << dir.string() << ": this run is already done" << std::endl;
   return status;
 }
 
@@ -109,17 +109,17 @@ bool PrepareFolder(const fs::path& dir, const std::string& config, bool resume,
   if (!begun) {
     for (const auto& entry : fs::directory_iterator(dir)) {
       if (entry.path().filename() != "config.toml.tmp") {
-        throw ConfigError(Concat(dir.string(), ": holds ", entry.path().filename().string(),
-                                 " but no config.toml: not a folder of a run"));
+        throw ConfigError(Concat(dir.string(), ": contains ", entry.path().filename().string(),
+                                 " but no config.toml: not the folder of a run"));
       }
     }
   }
   const RunStatus status = manifest ? manifest->status : RunStatus::kRunning;
   const bool ended = begun && (status == RunStatus::kDone || status == RunStatus::kDiverged);
   if (begun && !resume) {
-    throw ConfigError(Concat(dir.string(), ended
-                                               ? ": this run is " + ToString(status)
-                                               : ": holds an unfinished run; go on with --resume"));
+    throw ConfigError(
+        Concat(dir.string(), ended ? ": this run is " + ToString(status)
+                                   : ": contains an unfinished run; use --resume to continue"));
   }
   if (begun) RequireSameConfig(path, config);
   RequireRecordPlace(dir, config, begun);
@@ -235,8 +235,9 @@ class Run {
   /// before.
   void Start(const std::optional<Manifest>& before) {
     if (before && before->revision != parts_.revision) {
-      throw ConfigError(Concat(dir_.string(), ": this run was begun at revision ", before->revision,
-                               " of the method, this program is revision ", parts_.revision));
+      throw ConfigError(Concat(dir_.string(), ": this run was started by revision ",
+                               before->revision, " of the method; this program has revision ",
+                               parts_.revision));
     }
     manifest_.start = before ? before->start : Now();
     manifest_.revision = parts_.revision;
@@ -253,7 +254,8 @@ class Run {
       }
       const Metadata metadata = LoadCheckpoint(path, *algorithm_, Walk());
       Check(metadata == Describe(config_, env_.Spec(), *algorithm_, env_.TotalSteps()),
-            path.string(), ": the checkpoint of another run: its metadata do not fit config.toml");
+            path.string(),
+            ": not the checkpoint of this run: its metadata disagree with config.toml");
       logs_.Resume();
     } else {
       logs_.Create();
@@ -435,7 +437,7 @@ RunStatus Train(const RunConfig& config, const RunParts& parts, const fs::path& 
   }
   if (!begun) RequireRecordPlace(folder, text, begun);
   const bool made = fs::create_directories(folder, error);
-  if (error) throw ConfigError(Concat(folder.string(), ": cannot be made: ", error.message()));
+  if (error) throw ConfigError(Concat(folder.string(), ": cannot be created: ", error.message()));
   const FolderLock lock(folder);
   const std::optional<Manifest> before = ReadManifest(folder);
   try {

@@ -73,7 +73,7 @@ TEST_F(Csv, BadHeadersAreRefused) {
   EXPECT_EQ(ErrorOf(""), ":1: column 1: expected a name, got ''");
   EXPECT_EQ(ErrorOf("a,,b\n1,2,3\n"), ":1: column 2: expected a name, got ''");
   EXPECT_EQ(ErrorOf("a,b,\n1,2,3\n"), ":1: column 3: expected a name, got ''");
-  EXPECT_EQ(ErrorOf("a,a\n1,2\n"), ":1: column 'a' stands there twice");
+  EXPECT_EQ(ErrorOf("a,a\n1,2\n"), ":1: column 'a' appears twice");
 }
 
 TEST_F(Csv, AFileWithoutRowsIsRefused) { EXPECT_EQ(ErrorOf("a\n"), ": no rows after the header"); }

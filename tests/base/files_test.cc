@@ -199,8 +199,8 @@ TEST_F(Files, FoldersHaveOneName) {
   fs::create_directories(dir_ / "a" / "b");
   fs::create_symlink("a/b", dir_ / "link");
   EXPECT_EQ(FolderPath(dir_ / "link" / ".."), fs::canonical(dir_ / "a"));
-  EXPECT_EQ(MessageOf([] { FolderPath(""); }), "'': not a folder of a run");
-  EXPECT_EQ(MessageOf([] { FolderPath("/"); }), "'/': not a folder of a run");
+  EXPECT_EQ(MessageOf([] { FolderPath(""); }), "'': not the folder of a run");
+  EXPECT_EQ(MessageOf([] { FolderPath("/"); }), "'/': not the folder of a run");
 }
 
 }  // namespace

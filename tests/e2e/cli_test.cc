@@ -104,7 +104,7 @@ TEST_F(Program, TrainsIntoAFolderThatItThenRefusesOrLeavesAsItIs) {
   EXPECT_EQ(Train("--out run").code, 2);
   const Outcome again = Train("--out run --resume");
   EXPECT_EQ(again.code, 0);
-  EXPECT_EQ(again.err, "run: this run is done, nothing is left to do\n");
+  EXPECT_EQ(again.err, "run: this run is already done\n");
 }
 
 TEST_F(Program, RunsAgainFromTheConfigThatItWrote) {
@@ -209,7 +209,8 @@ TEST_F(Program, InterpretsOption2VecOnly) {
   ASSERT_EQ(Train("--out run").code, 0);
   const Outcome other = Run("interpret run");
   EXPECT_EQ(other.code, 2);
-  EXPECT_EQ(other.err, "option2vec: run/last.ckpt: made by ppo, whose options have no embedding\n");
+  EXPECT_EQ(other.err,
+            "option2vec: run/last.ckpt: trained by ppo, whose options have no embedding\n");
   EXPECT_EQ(Run("interpret run --algo option2vec").code, 2) << "the file says ppo";
   // A file from elsewhere: an empty header, then one that holds nothing of Option2Vec.
   WriteFileAtomically(dir_ / "x", std::string("\2\0\0\0\0\0\0\0{}", 10));

@@ -122,13 +122,13 @@ TEST_F(Streams, InterpretReplacesOnlyWhatItWrote) {
   for (const char* name : {"emb.csv", "emb.json"}) {
     WriteFileAtomically(dir_ / name, "{\"mine\": 1}");
     EXPECT_EQ(Refused(interpret + "emb.csv"),
-              std::string(name) + ": is not of an interpretation; move it away first\n");
+              std::string(name) + ": not written by `interpret`; move it away first\n");
     EXPECT_EQ(Text(name), "{\"mine\": 1}");
     fs::remove(dir_ / name);
     EXPECT_FALSE(fs::exists(dir_ / "emb.csv") || fs::exists(dir_ / "emb.json"));
   }
   EXPECT_EQ(Refused(interpret + "run.csv"),
-            "run.csv: is not of an interpretation; move it away first\n")
+            "run.csv: not written by `interpret`; move it away first\n")
       << "it is a record";
   EXPECT_EQ(Shell(interpret + "emb.csv").code, 0);
   EXPECT_EQ(Shell(interpret + "emb.csv").code, 0) << "its own";
@@ -148,8 +148,8 @@ TEST_F(Streams, FoldersHaveOneNameAndOneRecord) {
   EXPECT_EQ(Shell("ls -A | grep -v -e line.sh -e stdout -e stderr | tr '\\n' ' '; ls -A a").out,
             "a a.csv a.json b b.csv b.json c c.csv c.json config.toml\nepisodes.csv\nlast.ckpt\n"
             "manifest.json\ntiming.csv\nupdates.csv\n");
-  EXPECT_EQ(Refused("$TRAIN --out /"), "'/': not a folder of a run\n");
-  EXPECT_EQ(Refused("$TRAIN --out ''"), "'': not a folder of a run\n");
+  EXPECT_EQ(Refused("$TRAIN --out /"), "'/': not the folder of a run\n");
+  EXPECT_EQ(Refused("$TRAIN --out ''"), "'': not the folder of a run\n");
 }
 
 TEST_F(Streams, NumbersAreDecimalEverywhere) {
@@ -233,8 +233,8 @@ TEST_F(Streams, JobsKeepTheirFoldersNames) {
   EXPECT_EQ(again.code, 0);
   EXPECT_EQ(again.out, label +
                            "a|b&c\\d/tiny/paper/InvertedPendulum-v2/ppo/seed-000: this run is "
-                           "done, nothing is left to do\n1 runs: 0 done, 1 left, time left "
-                           "known after the first\n");
+                           "already done\n1 runs: 0 done, 1 left, the time left is known after "
+                           "the first run\n");
   EXPECT_EQ(Shell("$S/run_job.sh 'exit 3'").code, 0) << "diverged";
   EXPECT_EQ(Shell("$S/run_job.sh 'exit 2'").code, 2);
 }
@@ -245,7 +245,7 @@ TEST_F(Streams, ASignalStopsALongEvaluation) {
       "(exec $TRAIN --set eval_every=64 --set eval_episodes=100000 --out run) & "
       "until test -s run/timing.csv; do sleep 0.05; done; sleep 0.5; kill -TERM $!; wait $!");
   EXPECT_EQ(stopped.code, 1);
-  EXPECT_EQ(stopped.err, "option2vec: run: stopped by a signal; go on with --resume\n");
+  EXPECT_EQ(stopped.err, "option2vec: run: stopped by a signal; use --resume to continue\n");
   EXPECT_NE(Text("run/manifest.json").find("\"stopped\""), std::string::npos);
 }
 

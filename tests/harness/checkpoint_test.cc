@@ -265,7 +265,7 @@ TEST_F(Checkpoint, WithANameThatStandsTwiceIsRefused) {
   text.append((8 - text.size() % 8) % 8, ' ');
   const std::uint64_t length = text.size();
   Write(std::string(reinterpret_cast<const char*>(&length), 8) + text + data);
-  EXPECT_EQ(RefusedPolicy(), "bad header: actor.b stands there twice");
+  EXPECT_EQ(RefusedPolicy(), "bad header: actor.b appears twice");
 }
 
 TEST_F(Checkpoint, FromElsewhereMayHaveMetadataOfItsOwn) {

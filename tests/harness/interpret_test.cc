@@ -202,7 +202,7 @@ TEST(Interpretation, IsKeptByFidelityDeviationsTaskAndSeed) {
 TEST(FindCheckpoint, TakesTheFolderOfARunOrTheFileItself) {
   TestFolder dir;
   const auto message = [&] { return Message<ConfigError>([&] { FindCheckpoint(dir / "run"); }); };
-  EXPECT_EQ(message(), (dir / "run").string() + ": no such run folder or checkpoint");
+  EXPECT_EQ(message(), (dir / "run").string() + ": no such folder or checkpoint");
   std::filesystem::create_directory(dir / "run");
   EXPECT_EQ(message(), (dir / "run").string() + ": no last.ckpt in this folder");
   WriteFileAtomically(dir / "run" / "last.ckpt", "x");

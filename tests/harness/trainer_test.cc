@@ -81,7 +81,7 @@ TEST_F(Trainer, RefusesToGoOnWithARunOfAnotherRevision) {
   parts_.revision = 2;
   EXPECT_EQ(Refused([&] { Resume("run"); }),
             (dir_ / "run").string() +
-                ": this run was begun at revision 1 of the method, this program is revision 2");
+                ": this run was started by revision 1 of the method; this program has revision 2");
   EXPECT_EQ(ReadManifest(dir_ / "run")->revision, 1);
   parts_.revision = 1;
   EXPECT_EQ(Resume("run"), RunStatus::kDone);
@@ -229,8 +229,7 @@ TEST_F(Trainer, LeavesAFinishedRunAsItIs) {
   for (const char* name : {"run", "run/", "run/."}) {
     progress_.str("");
     EXPECT_EQ(Resume(name), RunStatus::kDone);
-    EXPECT_EQ(progress_.str(),
-              (dir_ / "run").string() + ": this run is done, nothing is left to do\n");
+    EXPECT_EQ(progress_.str(), (dir_ / "run").string() + ": this run is already done\n");
     EXPECT_EQ(ReadFile(dir_ / "run" / "manifest.json"), manifest);
   }
   config_.steps = 300;
@@ -263,7 +262,7 @@ TEST_F(Trainer, LeavesSomebodysFilesBesideTheFolderAlone) {
     WriteFileAtomically(dir_ / name, "mine");
     EXPECT_EQ(
         Refused([&] { Start("run"); }),
-        (dir_ / name).string() + ": is in the place of this run's record; move it away first");
+        (dir_ / name).string() + ": the record of this run goes here; move this file away first");
     EXPECT_EQ(ReadFile(dir_ / name), "mine");
     EXPECT_FALSE(fs::exists(dir_ / "run"));
     fs::remove(dir_ / name);
@@ -290,9 +289,9 @@ TEST_F(Trainer, RefusesNamesThatItsRecordHasNoRoomFor) {
   const std::string fits(246, 'n');  // + ".json.tmp" is 255
   EXPECT_EQ(Start(fits), RunStatus::kDone);
   EXPECT_TRUE(fs::exists(dir_ / (fits + ".json")));
-  EXPECT_EQ(
-      Refused([&] { Start(fits + "n"); }),
-      (dir_ / (fits + "n")).string() + ": its record's name would have 256 bytes, more than 255");
+  EXPECT_EQ(Refused([&] { Start(fits + "n"); }),
+            (dir_ / (fits + "n")).string() +
+                ": the name of its record would have 256 bytes, more than 255");
   EXPECT_FALSE(fs::exists(dir_ / (fits + "n")));
 }
 
@@ -354,7 +353,7 @@ TEST_F(Trainer, RefusesAnUnfinishedFolderUnlessToldToGoOn) {
   hooks.stop = [] { return true; };
   Start("run", hooks);
   EXPECT_EQ(Refused([&] { Start("run"); }),
-            (dir_ / "run").string() + ": holds an unfinished run; go on with --resume");
+            (dir_ / "run").string() + ": contains an unfinished run; use --resume to continue");
 }
 
 TEST_F(Trainer, NamesTheLineInWhichTheConfigDiffers) {
@@ -372,9 +371,9 @@ TEST_F(Trainer, NamesTheLineInWhichTheConfigDiffers) {
 TEST_F(Trainer, RefusesAFolderOfOtherThings) {
   fs::create_directory(dir_ / "run");
   WriteFileAtomically(dir_ / "run" / "thesis.tex", "");
-  EXPECT_EQ(
-      Refused([&] { Resume("run"); }),
-      (dir_ / "run").string() + ": holds thesis.tex but no config.toml: not a folder of a run");
+  EXPECT_EQ(Refused([&] { Resume("run"); }),
+            (dir_ / "run").string() +
+                ": contains thesis.tex but no config.toml: not the folder of a run");
 }
 
 TEST_F(Trainer, RefusesAFolderThatIsBeingTrainedIn) {
@@ -382,7 +381,7 @@ TEST_F(Trainer, RefusesAFolderThatIsBeingTrainedIn) {
   const int fd = ::open((dir_ / "run").c_str(), O_RDONLY);
   ASSERT_EQ(::flock(fd, LOCK_EX), 0);
   EXPECT_EQ(Refused([&] { Start("run"); }),
-            (dir_ / "run").string() + ": another process trains in this folder");
+            (dir_ / "run").string() + ": another process is training in this folder");
   ::close(fd);
   EXPECT_EQ(Start("run"), RunStatus::kDone);
 }

@@ -192,7 +192,7 @@ def stop(campaign, run, folder, rng):
     except subprocess.TimeoutExpired:
         process.send_signal(which)
     ended = campaign.end(process)
-    stopped = ended.code == 1 and "go on with --resume" in ended.error
+    stopped = ended.code == 1 and "use --resume to continue" in ended.error
     if ended.code not in (0, -which) and not stopped:
         raise Failure(f"{which.name}: exit {ended.code}: {ended.error.strip()}")
     campaign.finish(run, folder / "run")
@@ -222,7 +222,7 @@ def race(campaign, run, folder, rng):
     processes = [campaign.start(run, place) for _ in range(STARTS)]
     ends = [campaign.end(process) for process in processes]
     for ended in ends:
-        refused = ended.code == 2 and "another process trains in this folder" in ended.error
+        refused = ended.code == 2 and "another process is training in this folder" in ended.error
         if not finished(ended) and not refused:
             raise Failure(f"exit {ended.code}: {ended.error.strip()}")
     if all(ended.code != 0 for ended in ends):
