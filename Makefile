@@ -1,4 +1,4 @@
-# Front door. Every target installs and builds what it needs.
+# Every target installs and builds what it needs.
 SHELL := /bin/bash
 .SHELLFLAGS := -o pipefail -c
 .DEFAULT_GOAL := help
@@ -11,40 +11,40 @@ COMPILE = cmake --preset $(PRESET) > /dev/null && cmake --build --preset $(PRESE
 
 .PHONY: help deps build test clean gradcheck parity theory oracles bench reproduce lint lint-tidy format golden report plots torture fuzz
 
-help:  ## lists the targets
+help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-deps:  ## installs what is missing (PHYSICS=debian: Debian's libmujoco, not the faster one of PyPI)
+deps:  ## install missing packages (PHYSICS=debian: Debian's libmujoco, not PyPI's faster one)
 	@scripts/deps.sh
 	@PHYSICS=$(PHYSICS) scripts/deps_physics.sh
 
-build: deps  ## builds program, tests and benches (SAN=1: under ASan and UBSan)
+build: deps  ## build program, tests and benches (SAN=1: with ASan and UBSan)
 	@$(COMPILE)
 
-test: build  ## runs all tests (SAN=1: under ASan and UBSan)
+test: build  ## run all tests (SAN=1: with ASan and UBSan)
 	@ctest --test-dir build/$(PRESET) --output-on-failure -j2
 
-clean:  ## removes what was built; results stay
+clean:  ## remove the build; results stay
 	@rm -rf build
 
-gradcheck: deps  ## analytic against numeric gradients; writes results/gradcheck.csv
+gradcheck: deps  ## compare analytic with numeric gradients; write results/gradcheck.csv
 	@$(COMPILE) --target gradcheck
 	@build/$(PRESET)/tests/gradcheck
 
-parity: deps  ## physics against the reference numbers; writes results/parity.csv
+parity: deps  ## compare the physics with the reference's numbers; write results/parity.csv
 	@$(COMPILE) --target parity
 	@build/$(PRESET)/tests/parity
 
-theory: deps  ## the paper's statements on small exact processes; writes results/theory.csv
+theory: deps  ## check the paper's statements on small exact processes; write results/theory.csv
 	@$(COMPILE) --target theory
 	@build/$(PRESET)/tests/theory
 
 ORACLES ?= tests/data/oracles
-oracles: deps  ## losses, gradients, updates against the numbers in ORACLES=DIR
+oracles: deps  ## compare losses, gradients and updates with the numbers in ORACLES=DIR
 	@$(COMPILE) --target oracles
 	@build/$(PRESET)/tests/oracles $(ORACLES)
 
-bench: deps  ## costs of layers and environment steps beside the bound; writes results/bench.json
+bench: deps  ## measure layers and environment steps beside the bound; write results/bench.json
 	@$(COMPILE) --target o2v_bench
 	@build/$(PRESET)/bench/o2v_bench --benchmark_out=results/bench.json --benchmark_out_format=json
 
@@ -54,7 +54,7 @@ comma    := ,
 SUITES   := $(if $(filter paper,$(SUITE)),single_task transfer,$(SUITE))
 GRID     := $(SUITES) $(if $(FIDELITY),--fidelity $(FIDELITY:both=paper$(comma)released)) \
             $(if $(SEEDS),--seeds $(SEEDS)) $(if $(TASKS),--tasks $(TASKS)) $(if $(ALGOS),--algos $(ALGOS))
-reproduce: deps  ## reruns the paper, or SUITE=quick (FIDELITY= SEEDS= TASKS= ALGOS= JOBS=)
+reproduce: deps  ## rerun the paper, or SUITE=quick (FIDELITY= SEEDS= TASKS= ALGOS= JOBS=)
 	@$(COMPILE) --target option2vec $(if $(filter paper,$(SUITE)),gradcheck)
 	@if [ $(SUITE) = paper ]; then build/$(PRESET)/tests/gradcheck | tail -n 1; fi
 	@$(O2V) progress $(GRID) --at-once $(JOBS)
@@ -63,47 +63,47 @@ reproduce: deps  ## reruns the paper, or SUITE=quick (FIDELITY= SEEDS= TASKS= AL
 	@$(O2V) summary $$(ls -d $(foreach suite,$(SUITES),results/$(basename $(notdir $(suite)))) 2> /dev/null)
 	@if [ $(SUITE) = paper ]; then $(MAKE) --no-print-directory report; fi
 
-# Debian's, which has Debian's packages; without caches beside the sources.
+# Debian's Python, which sees Debian's packages. -B: no caches beside the sources.
 PYTHON := /usr/bin/python3 -B
 CHOICE  = $(addprefix --experiment ,$(EXPERIMENTS))
-report: deps  ## tables, claims, figures: results/REPORT.md, report.html (EXPERIMENTS=ci: in results/ci)
+report: deps  ## write tables, claims and figures: results/REPORT.md, report.html (EXPERIMENTS=ci: in results/ci)
 	@$(COMPILE) --target option2vec
 	@$(O2V) params --csv > results/params.csv.new && mv results/params.csv.new results/params.csv
 	@$(O2V) list switches > results/switches.txt.new && mv results/switches.txt.new results/switches.txt
 	@$(PYTHON) -m plots.report $(CHOICE) $(if $(CHOICE),--out results/$(firstword $(EXPERIMENTS)))
 	@$(if $(CHOICE),,$(PYTHON) -m plots.front)
 
-plots: deps  ## the figures alone: plots/*.svg and *.png
+plots: deps  ## draw the figures alone: plots/*.svg and *.png
 	@for script in plots/fig_*.py; do $(PYTHON) -m plots.$$(basename $$script .py) || exit; done
 
-lint: deps  ## formatting, include layering, cited sections, links and lengths of the pages
+lint: deps  ## check formatting, include layering, cited sections, links and lengths of the pages
 	@find src tests bench -name '*.cc' -o -name '*.h' | xargs clang-format --dry-run -Werror
 	@scripts/lint_layers.sh
 	@scripts/lint_spec.sh
 	@scripts/lint_links.sh
 
-lint-tidy: build  ## clang-tidy on the files changed since BASE=HEAD
+lint-tidy: build  ## run clang-tidy on the files changed since BASE=HEAD
 	@scripts/lint_tidy.sh $(or $(BASE),HEAD)
 
-format: deps  ## clang-format on all sources
+format: deps  ## run clang-format on all sources
 	@find src tests bench -name '*.cc' -o -name '*.h' | xargs clang-format -i
 
-golden: deps  ## rewrites the golden files; review the difference
+golden: deps  ## rewrite the golden files; review the difference
 	@$(COMPILE) --target test64_golden test_harness
 	@O2V_REWRITE_GOLDEN=1 build/$(PRESET)/tests/test64_golden
 	@O2V_REWRITE_GOLDEN=1 build/$(PRESET)/tests/test_harness --gtest_filter=ParamTable.IsTheOneOnRecord
 
 TORTURE ?=
-torture: deps  ## a seeded campaign of kills, full disks, limits, signals, races (TORTURE="--scale 0.1")
+torture: deps  ## disturb runs with kills, full disks, limits, signals, races (TORTURE="--scale 0.1")
 	@$(COMPILE) --target option2vec
 	@$(PYTHON) tests/torture/torture.py --program $(O2V) $(TORTURE)
 
-# libFuzzer takes what it finds new into a folder of build/; the committed corpus stays small.
+# libFuzzer saves new inputs in build/, so that the committed corpus stays small.
 RUNS    ?= 10000000
 SECONDS ?= 600
 TARGETS ?= checkpoint csv toml record jobs
-fuzz: deps  ## libFuzzer on what is read from files, with clang (RUNS= SECONDS= a target, TARGETS=)
-	@command -v clang++ > /dev/null || { echo "make fuzz needs clang and libclang-rt-dev"; exit 1; }
+fuzz: deps  ## run libFuzzer on all readers of files, with clang (per target RUNS= SECONDS=; TARGETS=)
+	@command -v clang++ > /dev/null || { echo "make fuzz: needs clang and libclang-rt-dev"; exit 1; }
 	@cmake --preset fuzz > /dev/null && cmake --build --preset fuzz --target $(TARGETS:%=fuzz_%)
 	@for target in $(TARGETS); do \
 	    mkdir -p build/fuzz/corpus/$$target && echo "$$target" && \

@@ -1,5 +1,5 @@
-# Script, run by every build: writes ${OUT} with the commit, the compiler and the flags of the program,
-# and leaves the file alone when nothing changed.
+# Script that every build runs: writes ${OUT} with commit, compiler and flags of the program. It leaves
+# the file alone when nothing changed.
 set(commit unknown)
 execute_process(COMMAND git rev-parse HEAD WORKING_DIRECTORY ${SOURCE_DIR} OUTPUT_VARIABLE head
                 OUTPUT_STRIP_TRAILING_WHITESPACE RESULT_VARIABLE failed ERROR_QUIET)

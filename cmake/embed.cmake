@@ -1,6 +1,6 @@
-# o2v_embed(<target> <name> <glob>...): compiles the matched text files into <target> and gives it the
-# header "embedded/<name>.h" with   std::span<const EmbeddedFile> Embedded_<name>();
-# a name is the file's path below the folder of the first glob ("gym_ant.xml", "algo/ppo.toml").
+# o2v_embed(<target> <name> <glob>...): compiles the matched text files into <target>. The header
+# "embedded/<name>.h" declares   std::span<const EmbeddedFile_<name>> Embedded_<name>();
+# A file's name is its path below the folder of the first glob ("gym_ant.xml", "algo/ppo.toml").
 function(o2v_embed target name)
   set(dir ${CMAKE_BINARY_DIR}/embedded/${target})
   list(GET ARGN 0 first)

@@ -1,8 +1,8 @@
 #!/bin/sh
-# Installs the Debian packages of this list that are missing; does nothing when none is.
+# Installs those Debian packages of this list that are missing.
 set -eu
 
-# libgl-dev and libopengl-dev: the CMake file of libmujoco-dev asks for them, its package does not.
+# The CMake file of libmujoco-dev needs libgl-dev and libopengl-dev, but its package does not name them.
 packages="
   g++ cmake ninja-build make git
   libeigen3-dev libmujoco-dev libgl-dev libopengl-dev libtomlplusplus-dev libcli11-dev nlohmann-json3-dev
@@ -23,7 +23,7 @@ if [ "$(id -u)" = 0 ]; then
 elif command -v sudo >/dev/null; then
   sudo=sudo
 else
-  echo "deps: neither root nor sudo; please install:$missing" >&2
+  echo "deps: neither root nor sudo; install:$missing" >&2
   exit 1
 fi
 
@@ -33,5 +33,5 @@ install() {
   $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends \
     -o DPkg::Lock::Timeout=120 $missing </dev/null
 }
-# The package lists may be absent or old: fetched when an installation without them fails.
+# The package lists may be absent or old. They are fetched when the installation fails.
 install 2>/dev/null || { $sudo apt-get update -q </dev/null && install; }

@@ -1,7 +1,6 @@
 #!/bin/sh
-# Fetches MuJoCo's own build of libmujoco 2.2.2, faster than Debian's and of the same results,
-# into build/physics. Leaves Debian's in use, and says so, when PHYSICS=debian or it cannot
-# be had.
+# Fetches MuJoCo's own build of libmujoco 2.2.2 into build/physics: it is faster than Debian's and gave
+# the same results. With PHYSICS=debian, or when it cannot be fetched, Debian's stays in use.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -35,7 +34,7 @@ fi
 mkdir -p "$dir"
 fetched=$(mktemp -d "$dir/fetch.XXXXXX")
 trap 'rm -rf "$fetched"' EXIT
-# One short attempt: a machine without a network waits for seconds.
+# One short attempt, so that a machine without a network waits for seconds only.
 if ! timeout 120 python3 -m pip download --quiet --disable-pip-version-check --no-cache-dir \
     --retries 0 --timeout 10 --no-deps --only-binary=:all: --python-version 3.10 \
     --implementation cp --platform manylinux_2_17_x86_64 --dest "$fetched" mujoco==2.2.2 \

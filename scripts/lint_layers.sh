@@ -1,12 +1,12 @@
 #!/bin/sh
-# Checks that a file of src/ includes only its own folder and folders below it, and that the headers
-# of third parties stay where they are confined.
+# Checks that a file of src/ includes only its own folder and the layers below it, and that headers of
+# third parties appear only where they may.
 set -eu
 cd "$(dirname "$0")/.."
 
 find src -name '*.cc' -o -name '*.h' | sort | xargs awk '
   BEGIN {
-    # What a folder may include beside itself.
+    # What a folder may include besides itself.
     may["base"] = " "
     may["nn"] = may["dist"] = may["env"] = " base "
     may["rollout"] = " base nn dist env "

@@ -11,7 +11,7 @@ find README.md docs src tests bench paper_configs plots -type f ! -path 'tests/d
     \( -name '*.cc' -o -name '*.h' -o -name '*.inc' -o -name '*.toml' -o -name '*.py' \
        -o -name '*.txt' -o -name '*.md' \) |
   sort | xargs awk '
-  # The two pages: sections by their headings, their letters and items by the lines that open them.
+  # The two pages: headings name sections; lines that begin with a letter or number name their parts.
   FILENAME == "docs/algorithms.md" || FILENAME == "docs/environments.md" {
     if ($1 ~ /^#+$/) {
       section = $2; sub(/\.$/, "", section)
@@ -28,8 +28,8 @@ find README.md docs src tests bench paper_configs plots -type f ! -path 'tests/d
     print FILENAME ":" FNR ": docs/ has no " what; bad = 1
   }
 
-  # What the next word may be is `want`: "" nothing, "number" the first section, "more" a list that
-  # goes on.
+  # `want` is what the next word may be: "" nothing, "number" the first section, "more" the rest of a
+  # list.
   function read_word(word,    bare, tail) {
     bare = word
     gsub(/^[("]+|[)"]+$/, "", bare)
@@ -57,7 +57,7 @@ find README.md docs src tests bench paper_configs plots -type f ! -path 'tests/d
   }
 
   /spec\/[a-z]/ { print FILENAME ":" FNR ": cite a section, as spec N.N or spec E.N"; bad = 1 }
-  FNR == 1 || $1 !~ /^(\/\/|#)/ { want = "" }  # only a comment goes on in the next line
+  FNR == 1 || $1 !~ /^(\/\/|#)/ { want = "" }  # only a comment continues in the next line
   { for (i = 1; i <= NF; ++i) if ($i !~ /^(\/\/+|#+)$/) read_word($i) }
   END { exit bad }
 ' docs/algorithms.md docs/environments.md

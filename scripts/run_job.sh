@@ -1,19 +1,19 @@
 #!/usr/bin/env bash
-# Runs one line of `option2vec jobs`, its output marked with the run's folder; then, when GRID holds the
-# arguments of `option2vec progress`, says how far the whole grid has come.
-# A diverged run (exit code 3) is a result, not a failure; a run that had ended before is left as it is.
+# Runs one line of `option2vec jobs` and marks its output with the run's folder. When GRID holds the
+# arguments of `option2vec progress`, it then prints the progress of the whole grid.
+# A diverged run (exit code 3) is a result, not a failure. A run that has ended is left alone.
 set -uo pipefail
 
 label=${1##* --out }
 label=${label% --resume}
-# The program ends on a signal by itself, with a checkpoint; what marks its last lines waits for it.
+# On a signal the program writes a checkpoint and ends by itself; the loop waits for its last lines.
 eval "$1" 2>&1 | (
   trap '' INT TERM
   while IFS= read -r line || [ -n "$line" ]; do printf '%s: %s\n' "$label" "$line"; done
 )
 status=$?
 if [ -n "${GRID:-}" ]; then
-  # The first word of the line, quoted for a shell, and GRID, a list of words.
+  # The program is the first word of the line, quoted for a shell. GRID is a list of words.
   eval "program=${1%% train --config *}"
   # shellcheck disable=SC2086,SC2154
   "$program" progress $GRID

@@ -3,12 +3,12 @@
 #
 #   build/release/option2vec jobs single_task | scripts/slurm_array.sh --chunk 4 --time=24:00:00
 #
-# Task i runs line i; with --chunk N it runs the N lines up to line i N one after the other, so that an
-# array of many lines stays below the site's limit (MaxArraySize of `scontrol show config`). All other
-# arguments are sbatch's. The lines are submitted with the script: lists made later do not matter to it.
-# A run that has ended is left as it is, so that a task that is queued again goes on where it was.
-# A run that was cancelled, or cut off by its time limit, goes on from its last checkpoint when what
-# `jobs` then prints is submitted.
+# Task i runs line i. With --chunk N it runs N lines, up to line i N, one after the other: this keeps a
+# long list below the site's limit (MaxArraySize of `scontrol show config`). All other arguments go to
+# sbatch. The lines are submitted with the script, so that later lists do not change it.
+# A run that has ended is left alone, so that a requeued task continues where it was. After a
+# cancellation or a time limit, submit what `jobs` then prints: each run continues from its last
+# checkpoint.
 set -euo pipefail
 
 chunk=1
@@ -17,7 +17,7 @@ if [ "${1:-}" = --chunk ]; then
   shift 2 || true
 fi
 if ! [[ $chunk =~ ^0*[1-9][0-9]{0,8}$ ]]; then
-  echo "slurm_array: --chunk wants a number of lines, not '$chunk'" >&2
+  echo "slurm_array: --chunk takes a number of lines, not '$chunk'" >&2
   exit 2
 fi
 chunk=$((10#$chunk))

@@ -400,7 +400,8 @@ TEST(Formats, AreSaidFromTheSecondOnAndReadBack) {
 TEST(Formats, OfNewerProgramsAreRefused) {
   for (const char* format : {"2", "0", "-1", "1.5", "\"1\""}) {
     const std::string text = Concat("format = ", format, "\n", Without({}));
-    EXPECT_CONTAINS(Message([&] { ParseRunConfig(text, "x.toml"); }), "x.toml:1: configuration format");
+    EXPECT_CONTAINS(Message([&] { ParseRunConfig(text, "x.toml"); }),
+                    "x.toml:1: configuration format");
   }
 }
 
