@@ -1,6 +1,7 @@
 #!/bin/sh
 # Checks README.md and the pages of docs/: every link names a file of the repository and, after '#', a
-# heading of it; the README has at most 150 lines, a page at most 200 (but the two specifications).
+# heading of it; every path in `code` exists; the README has at most 150 lines, a page at most 200 (but
+# the two specifications).
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -9,6 +10,7 @@ import re
 import sys
 from pathlib import Path
 
+CODE_PATH = r"`((?:src|tests|plots|scripts|bench|cmake|paper_configs|docs)/[\w./-]+)`"
 SPECIFICATIONS = {"docs/algorithms.md", "docs/environments.md"}
 bad = 0
 
@@ -49,6 +51,9 @@ for name in sys.argv[1:]:
     if name not in SPECIFICATIONS and length > most:
         complain(name, f"{length} lines, more than {most}")
     for number, line in lines_of(page):
+        for path in re.findall(CODE_PATH, line):
+            if not Path(path).exists():
+                complain(f"{name}:{number}", f"no file {path}")
         for target in re.findall(r"\]\(([^)\s]+)\)", re.sub(r"`[^`]*`", "", line)):
             if re.match(r"[a-z]+:", target):
                 continue
