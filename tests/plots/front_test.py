@@ -10,7 +10,7 @@ import numpy as np
 from plots import front
 from plots.records import METHODS, TASKS
 from plots.style import LOOKS
-from tree import with_reference, write_run
+from tree import with_reference, write_flat, write_run
 
 
 def line_of(panel, color: str) -> np.ndarray:
@@ -33,10 +33,12 @@ class FrontTest(unittest.TestCase):
             write_run(self.results, "Hopper-v2", "option2vec", seed, [0] * 99 + [final], "released")
         write_run(self.results, "Hopper-v2", "ppo", 0, [300] * 100, "released")
         write_run(self.results, "Hopper-v2", "ppo", 0, [700] * 100, "paper")
+        write_flat(self.results, "Hopper-v2", "oc", [10, 20, 30], fidelity="released",
+                   experiment="mine")
         panel = self.panels()["Hopper-v2"]
         self.assertEqual(line_of(panel, LOOKS["option2vec"].color)[-1].tolist(), [1, 1500])
         self.assertEqual(line_of(panel, LOOKS["ppo"].color)[-1].tolist(), [1, 300])
-        self.assertEqual(panel.get_title(), "Hopper-v2\nn = 2, others 1")
+        self.assertEqual(panel.get_title(), "Hopper-v2\nn = 2, others 1-3")
 
     def test_a_task_without_runs_says_so_and_shows_the_authors_curve(self):
         panel = self.panels()["Ant-v2"]
