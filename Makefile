@@ -9,10 +9,10 @@ PRESET := $(if $(filter 1,$(SAN)),asan,release)
 O2V    := build/$(PRESET)/option2vec
 COMPILE = cmake --preset $(PRESET) > /dev/null && cmake --build --preset $(PRESET)
 
-.PHONY: help deps build test clean gradcheck parity theory oracles bench reproduce lint lint-tidy format golden report plots torture fuzz
+.PHONY: help deps build test clean gradcheck parity theory oracles bench bench-peers reproduce lint lint-tidy format golden report plots torture fuzz
 
 help:  ## list the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 deps:  ## install missing packages (PHYSICS=debian: Debian's libmujoco, not PyPI's faster one)
 	@scripts/deps.sh
@@ -47,6 +47,14 @@ oracles: deps  ## compare losses, gradients and updates with the numbers in ORAC
 bench: deps  ## measure layers and environment steps beside the bound; write results/bench.json
 	@$(COMPILE) --target o2v_bench
 	@build/$(PRESET)/bench/o2v_bench --benchmark_out=results/bench.json --benchmark_out_format=json
+	@$(PYTHON) -m bench.grid_hours
+
+# Several gigabytes of packages go into a place of their own.
+bench-peers: deps  ## CPU time beside Stable-Baselines3, gymnasium, EnvPool; writes docs/performance.md
+	@$(COMPILE) --target option2vec o2v_bench
+	@test -x build/peers/bin/python || /usr/bin/python3 -m venv build/peers
+	@build/peers/bin/python -m pip install -q -r bench/peers/requirements.txt
+	@$(PYTHON) bench/peers/peers.py $(PEERS)
 
 SUITE    ?= paper
 FIDELITY ?= $(if $(filter paper single_task transfer ablation,$(SUITE)),paper)

@@ -1,7 +1,7 @@
 #pragma once
-// What a step of training cannot but cost: work that no implementation avoids, at the rate that
-// bare Eigen kernels reach here. Contains no timing of our own layers; our own products
-// (nn/product.cc) are faster than Eigen's of these sizes, so that they may undercut their share.
+// What a step of training cannot but cost: work that no implementation avoids, at the best rate
+// that a bare product or memory pass reaches here. A product's is Eigen's or that of our own loops
+// (nn/product.h), whichever is faster; of our layers nothing else is timed.
 
 #include <string>
 #include <vector>
@@ -33,8 +33,8 @@ std::vector<Product> Products(const RunConfig& config, int S, int A);
 /// that learns once an episode.
 double AdamEntriesPerStep(const RunConfig& config, int S, int A, double episode_length);
 
-/// CPU seconds of one bare Eigen product of these shapes on data that stays in cache. Takes some
-/// milliseconds.
+/// CPU seconds of one bare product of these shapes on data that stays in cache, Eigen's or ours:
+/// that of the faster. Takes some milliseconds.
 double ProductSeconds(Index m, Index k, Index n);
 /// The same of all these products, an environment step; each shape is measured once a call.
 double ProductSecondsPerStep(const std::vector<Product>& products);

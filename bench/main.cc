@@ -1,10 +1,12 @@
 // Benchmarks: single layers, and whole steps of training beside their bound.
-//   o2v_bench [--products TASK METHOD FIDELITY] [Google Benchmark's options]
+//   o2v_bench [--products TASK METHOD FIDELITY] [--steps TASK N] [Google Benchmark's options]
 
 #include <benchmark/benchmark.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
+#include <vector>
 
 #include "bench/bound.h"
 #include "env/env.h"
@@ -34,12 +36,30 @@ void PrintProducts(const char* task, const char* method, const char* fidelity) {
   }
 }
 
+/// Random actions, for the CPU time of stepping alone (bench/peers).
+void Step(const char* task, long steps) {
+  const auto env = MakeEnv(task, {});
+  const EnvSpec& spec = env->Spec();
+  Rng rng(0, "bench");
+  std::vector<double> obs(std::size_t(spec.S)), a(spec.a_low.size());
+  env->Reset(rng, obs);
+  for (long step = 0; step < steps; ++step) {
+    for (std::size_t i = 0; i < a.size(); ++i) a[i] = rng.Uniform(spec.a_low[i], spec.a_high[i]);
+    const StepResult result = env->Step(a, obs);
+    if (result.terminated || result.truncated) env->Reset(rng, obs);
+  }
+}
+
 }  // namespace
 }  // namespace o2v::bench
 
 int main(int argc, char** argv) {
   if (argc == 5 && std::strcmp(argv[1], "--products") == 0) {
     o2v::bench::PrintProducts(argv[2], argv[3], argv[4]);
+    return 0;
+  }
+  if (argc == 4 && std::strcmp(argv[1], "--steps") == 0) {
+    o2v::bench::Step(argv[2], std::atol(argv[3]));
     return 0;
   }
   o2v::bench::RegisterStepBenches();
