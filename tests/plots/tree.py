@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from plots.records import PAIRS
-from plots.standard import settings_of
+from option2vec_results.standard import settings_of
 
 ROOT = Path(__file__).parents[2]
 
