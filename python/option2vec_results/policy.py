@@ -8,6 +8,7 @@ import struct
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ class Policy:
     metadata: Mapping[str, str]
     tensors: Mapping[str, np.ndarray]
 
-    @property
+    @cached_property
     def config(self) -> dict[str, Any]:
         """The resolved configuration of the run that made it; {} where the file has none."""
         return tomllib.loads(self.metadata.get("config", ""))

@@ -30,6 +30,7 @@
 #include "harness/param_table.h"
 #include "harness/record.h"
 #include "harness/summary.h"
+#include "harness/tensorboard.h"
 #include "harness/trainer.h"
 #include "nn/isa.h"
 
@@ -214,6 +215,7 @@ LoadedPolicy LoadPolicyFile(const std::string& checkpoint, RunRequest request) {
 void AddEval(CLI::App& app) {
   struct Options : RunOptions {
     std::string checkpoint, action = "sample";
+    std::optional<std::string> trajectory;
     int episodes = 10;
     std::uint64_t seed = 0;
   };
@@ -230,6 +232,8 @@ void AddEval(CLI::App& app) {
       ->check(CLI::IsMember({"sample", "mean"}))
       ->capture_default_str();
   AddWhole(*eval, "--seed", opt->seed, 0, kMaxWhole, "seed of the episodes")->default_str("0");
+  eval->add_option("--trajectory", opt->trajectory,
+                   "CSV of all steps: episode, step, o, P0.., a0.., reward, obs0..");
   eval->footer(
       "--task, --algo, --fidelity and --set are needed only when the file does not name them.\n"
       "After a transfer run, --task chooses one of its tasks (default: the last one).\n"
@@ -240,8 +244,15 @@ void AddEval(CLI::App& app) {
       "--fidelity released");
   eval->callback([opt] {
     LoadedPolicy policy = LoadPolicyFile(opt->checkpoint, opt->request);
+    CsvTable trajectory = NewTrajectory(policy.env->Spec(), policy.algorithm->NumOptions());
+    StepHook visit;
+    if (opt->trajectory) {
+      RequireWritable(*opt->trajectory);
+      visit = [&trajectory](const EvalStep& step) { Append(step, trajectory); };
+    }
     const auto episodes = Evaluate(*policy.algorithm, policy.normalizer, *policy.env, opt->episodes,
-                                   opt->action == "sample", opt->seed);
+                                   opt->action == "sample", opt->seed, visit);
+    if (opt->trajectory) WriteFileAtomically(*opt->trajectory, CsvText(trajectory));
     std::vector<double> returns;
     std::cout << "episode,return,length\n";
     for (const EvalEpisode& episode : episodes) {
@@ -335,6 +346,44 @@ void AddInterpret(CLI::App& app) {
     WriteFileAtomically(out, InterpretationCsv(found));
     std::cout << out.string() << ": " << found.W_o.rows() << " dimensions, " << found.states
               << " states of " << opt->episodes << " episodes on " << task << "\n";
+  });
+}
+
+// ---- export
+
+void AddExport(CLI::App& app) {
+  struct Options : RunOptions {
+    std::optional<std::string> policy, tensorboard;
+    std::filesystem::path out;
+  };
+  auto opt = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("export", "a run or its policy for other programs");
+  CLI::App* what = command->add_option_group("what")->require_option(1);
+  what->add_option("--policy", opt->policy,
+                   "folder of a run, or a checkpoint: parameters and normaliser alone into --out");
+  what->add_option("--tensorboard", opt->tensorboard,
+                   "folder of a run: its curves as an event file in the folder --out");
+  opt->Add(*command);
+  command->add_option("--out", opt->out, "file of the policy; folder of the event file")
+      ->required();
+  command->footer(
+      "Task, method, fidelity and --set are for policies whose file does not say them.\n"
+      "Examples:\n"
+      "  option2vec export --policy runs/a --out a.safetensors\n"
+      "  option2vec export --tensorboard runs/a --out tensorboard/a");
+  command->callback([opt] {
+    if (opt->policy) {
+      RequireWritable(opt->out);
+      const std::filesystem::path file = FindCheckpoint(*opt->policy);
+      LoadedPolicy policy = LoadPolicyFile(file.string(), opt->request);
+      Metadata metadata = ReadMetadata(file);
+      if (metadata.empty()) metadata = {{"config", ToToml(policy.config)}};
+      SavePolicy(opt->out, metadata, *policy.algorithm, policy.normalizer);
+    } else {
+      const std::string events = EventFile(FolderPath(*opt->tensorboard));
+      std::filesystem::create_directories(opt->out);
+      WriteFileAtomically(opt->out / "events.out.tfevents.option2vec", events);
+    }
   });
 }
 
@@ -525,6 +574,7 @@ int Main(int argc, char** argv) {
   AddEval(app);
   AddForward(app);
   AddInterpret(app);
+  AddExport(app);
   AddParams(app);
   AddReplay(app, exit_code);
   AddRecord(app);

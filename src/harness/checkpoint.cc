@@ -346,6 +346,14 @@ void SaveCheckpoint(const std::filesystem::path& path, Metadata metadata, Learne
   WriteFileAtomically(path, saver.Text(std::move(metadata)), before_rename);
 }
 
+void SavePolicy(const std::filesystem::path& path, const Metadata& metadata, Learner& learner,
+                Normalizer& normalizer) {
+  SaveCheckpoint(path, metadata, learner, [&](StateVisitor& v) {
+    for (Param* p : learner.Params()) v.Matrix(p->name, p->value);
+    normalizer.Visit(v);
+  });
+}
+
 Metadata LoadCheckpoint(const std::filesystem::path& path, Learner& learner,
                         const StateWalk& walk) {
   File file = ParseFile(path);

@@ -31,6 +31,10 @@ using StateWalk = std::function<void(StateVisitor&)>;
 void SaveCheckpoint(const std::filesystem::path& path, Metadata metadata, Learner& learner,
                     const StateWalk& walk, const std::function<void()>& before_rename = {});
 
+/// Writes a policy alone, as SaveCheckpoint writes it: parameters and normaliser.
+void SavePolicy(const std::filesystem::path& path, const Metadata& metadata, Learner& learner,
+                Normalizer& normalizer);
+
 /// Restores all state of a run from a file of SaveCheckpoint, which must hold exactly the tensors
 /// that `walk` shows, finite and within the bounds that the walk states. Returns the metadata that
 /// SaveCheckpoint was given.

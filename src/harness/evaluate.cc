@@ -17,7 +17,8 @@ void AddColumns(CsvTable& table, const std::string& name, Index n) {
   for (Index i = 0; i < n; ++i) table.columns.push_back(Concat(name, i));
 }
 
-void AppendColumn(const Mat& x, Index b, std::vector<double>& values) {
+template <typename Matrix>
+void AppendColumn(const Matrix& x, Index b, std::vector<double>& values) {
   for (Index i = 0; i < x.rows(); ++i) values.push_back(static_cast<double>(x(i, b)));
 }
 
@@ -34,10 +35,10 @@ int ReadIndex(const CsvTable& table, std::size_t row, std::size_t column, int n)
 
 std::vector<EvalEpisode> Evaluate(Policy& policy, const Normalizer& normalizer, Env& env,
                                   int episodes, bool sample_action, std::uint64_t seed,
-                                  const VisitHook& visit, const std::function<bool()>& stop) {
+                                  const StepHook& visit, const std::function<bool()>& stop) {
   const EnvSpec& spec = env.Spec();
   Rng resets(seed, "eval.reset"), options(seed, "eval.option"), actions(seed, "eval.action");
-  VecD raw(spec.S);
+  VecD raw(spec.S), before(spec.S);
   Mat s(spec.S, 1), P, mu, sigma;
   Vec state(spec.S);
   std::vector<double> a(static_cast<std::size_t>(spec.A));
@@ -56,7 +57,6 @@ std::vector<EvalEpisode> Evaluate(Policy& policy, const Normalizer& normalizer, 
       s = state;
       policy.OptionPolicy(s, o_prev, init, P);
       SampleCategorical(P, options, o);
-      if (visit) visit(s, o[0]);
       policy.ActionPolicy(s, o, mu, sigma);
       for (std::size_t j = 0; j < a.size(); ++j) {
         const Index row = static_cast<Index>(j);
@@ -64,7 +64,9 @@ std::vector<EvalEpisode> Evaluate(Policy& policy, const Normalizer& normalizer, 
         if (sample_action) x += static_cast<double>(sigma(row, 0)) * actions.Normal();
         a[j] = std::clamp(x, spec.a_low[j], spec.a_high[j]);
       }
+      before = raw;
       const StepResult step = env.Step(a, obs);
+      if (visit) visit({e, episode.length, before, s, P, o[0], a, step.reward});
       episode.ret += step.reward;
       ++episode.length;
       done = step.terminated || step.truncated;
@@ -74,6 +76,25 @@ std::vector<EvalEpisode> Evaluate(Policy& policy, const Normalizer& normalizer, 
     results.push_back(episode);
   }
   return results;
+}
+
+CsvTable NewTrajectory(const EnvSpec& spec, int K) {
+  CsvTable table;
+  table.columns = {"episode", "step", "o"};
+  AddColumns(table, "P", K);
+  AddColumns(table, "a", spec.A);
+  table.columns.push_back("reward");
+  AddColumns(table, "obs", spec.S);
+  return table;
+}
+
+void Append(const EvalStep& step, CsvTable& trajectory) {
+  std::vector<double>& values = trajectory.values;
+  values.insert(values.end(), {double(step.episode), double(step.t), double(step.o)});
+  AppendColumn(step.P, 0, values);
+  values.insert(values.end(), step.a.begin(), step.a.end());
+  values.push_back(step.reward);
+  AppendColumn(step.obs, 0, values);
 }
 
 void Forward(Policy& policy, const EnvSpec& spec, const std::filesystem::path& input,

@@ -4,9 +4,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "algo/algorithm.h"
+#include "base/csv.h"
 #include "env/env.h"
 #include "rollout/normalizer.h"
 
@@ -18,17 +20,31 @@ struct EvalEpisode {
   int length;  // [environment steps]
 };
 
-/// Called in a visited state s (S, 1), normalised, with the option o executed there.
-using VisitHook = std::function<void(const Mat& s, int o)>;
+/// A step that has been made.
+struct EvalStep {
+  int episode, t;             // both from 0
+  const VecD& obs;            // (S) the state as the task gave it,
+  const Mat& s;               // (S, 1) normalised
+  const Mat& P;               // (K, 1) what the option was drawn with
+  int o;                      // executed
+  std::span<const double> a;  // (A) as the task took it: clipped
+  double reward;
+};
+using StepHook = std::function<void(const EvalStep&)>;
 
 /// Runs whole episodes with frozen networks and statistics. Options are drawn from the option
 /// policy; actions from the Gaussian, or its mean when `sample_action` is false. The same seed
 /// gives the same episodes: all randomness comes from streams "eval.*" of `seed`. `stop` is asked
-/// before each step; when it says true, the episodes that have ended are returned.
+/// before each step; when it says true, the episodes that have ended are returned. `visit` is
+/// called after each.
 std::vector<EvalEpisode> Evaluate(Policy& policy, const Normalizer& normalizer, Env& env,
                                   int episodes, bool sample_action, std::uint64_t seed,
-                                  const VisitHook& visit = {},
+                                  const StepHook& visit = {},
                                   const std::function<bool()>& stop = {});
+
+/// A table of steps: episode, step, o, P0.. (K), a0.. (A), reward, obs0.. (S).
+CsvTable NewTrajectory(const EnvSpec& spec, int K);
+void Append(const EvalStep& step, CsvTable& trajectory);
 
 /// Network outputs for given inputs, dropout off. Reads a CSV with the columns s0.. (S, normalised
 /// state), o_prev, init, o (0-based; the option fed to action net and critic), in any order, and

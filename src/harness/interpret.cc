@@ -37,9 +37,9 @@ Interpretation Interpret(Policy& policy, const Normalizer& normalizer, Env& env,
   std::vector<Real> visited;  // states, one after the other
   std::vector<int> o;
   Evaluate(policy, normalizer, env, episodes, /*sample_action=*/true, seed,
-           [&](const Mat& s, int option) {
-             visited.insert(visited.end(), s.data(), s.data() + s.size());
-             o.push_back(option);
+           [&](const EvalStep& step) {
+             visited.insert(visited.end(), step.s.data(), step.s.data() + step.s.size());
+             o.push_back(step.o);
            });
   const Mat s = Eigen::Map<const Mat>(visited.data(), env.Spec().S, Index(o.size()));
 

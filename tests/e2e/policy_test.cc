@@ -168,6 +168,49 @@ TEST_F(PolicyCommands, DropoutIsOff) {
   EXPECT_EQ(outputs(" --set o2v_dropout=0.9"), without);
 }
 
+TEST_F(PolicyCommands, ExportedPoliciesActAsTheirRuns) {
+  TrainRun("--task Reacher-v2 --algo option2vec --steps 256 --set workers=2");
+  ASSERT_EQ(Run("export --policy run --out x.safetensors").code, 0);
+  const Outcome outcome =
+      Run("eval --checkpoint x.safetensors --episodes 2 --seed 3 --trajectory steps.csv");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(outcome.out, Eval("--episodes 2 --seed 3"));
+  EXPECT_EQ(ReadMetadata(dir_ / "x.safetensors").at("config"),
+            ReadFile(dir_ / "run" / "config.toml"));
+  // Every number of the table is read back as it was: the returns are sums of its rewards.
+  const CsvTable steps = ReadCsv(dir_ / "steps.csv");
+  const Rollout expected(dir_ / "run" / "last.ckpt", "Reacher-v2", 2, /*sample=*/true, 3);
+  std::vector<double> returns = {0, 0};
+  for (std::size_t row = 0; row < steps.Rows(); ++row) {
+    returns[std::size_t(steps.At(row, 0))] += steps.At(row, steps.Column("reward"));
+  }
+  EXPECT_EQ(returns, expected.returns);
+}
+
+TEST_F(PolicyCommands, ExportOfAForeignFileSaysHowToActWithIt) {
+  TrainRun("--task Reacher-v2 --algo ppo --steps 256 --set hidden=8 --set workers=2");
+  ASSERT_EQ(Run("export --policy run --out x.safetensors").code, 0);
+  std::string foreign = ReadFile(dir_ / "x.safetensors");
+  foreign.replace(foreign.find("option2vec-1"), 12, "somewhere---");
+  WriteFileAtomically(dir_ / "foreign", foreign);
+  EXPECT_EQ(Run("export --policy foreign --out y").code, 2) << "of which method?";
+  EXPECT_FALSE(std::filesystem::exists(dir_ / "y"));
+  ASSERT_EQ(Run("export --policy foreign --task Reacher-v2 --algo ppo --set hidden=8 --out y").code,
+            0);
+  EXPECT_EQ(Run("eval --checkpoint y --episodes 2").out, Eval("--episodes 2"));
+}
+
+TEST_F(Program, ExportLeavesNoHalfFile) {
+  ASSERT_EQ(Train("--out run").code, 0);
+  EXPECT_EQ(Run("export --policy run --out nowhere/x").code, 2);
+  EXPECT_EQ(Run("export --policy run --tensorboard run --out x").code, 2);
+  EXPECT_EQ(Run("export --tensorboard nowhere --out x").code, 2);
+  EXPECT_EQ(Run("eval --checkpoint run/last.ckpt --episodes 1 --trajectory nowhere/x").code, 2);
+  EXPECT_FALSE(std::filesystem::exists(dir_ / "x"));
+  ASSERT_EQ(Run("export --tensorboard run --out x/y").code, 0);
+  EXPECT_TRUE(std::filesystem::exists(dir_ / "x" / "y" / "events.out.tfevents.option2vec"));
+}
+
 TEST_F(PolicyCommands, ForwardWritesWhatTheNetworksSay) {
   // All weights are 0, so that the outputs are those of the last biases:
   //   P = softmax(ln(1, 2, 3, 4)) at an episode's start, softmax(ln(4, 3, 2, 1)) elsewhere,

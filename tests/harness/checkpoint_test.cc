@@ -299,6 +299,27 @@ TEST_F(Checkpoint, OfARunGivesItsPolicy) {
   EXPECT_EQ(normalizer.count(), saved.env.normalizer().count());
 }
 
+TEST_F(Checkpoint, OfAPolicyAloneHoldsParametersAndNormaliserAlone) {
+  State saved(1), loaded(2);
+  Normalizer statistics(2), normalizer(2);
+  statistics.Set(VecD::Constant(2, 0.1), VecD::Constant(2, 3), 7);
+  SavePolicy(path_, {{"config", "x"}}, saved.algorithm, statistics);
+  std::vector<std::string> names;
+  const json header = Split(ReadFile(path_)).first;
+  for (const auto& [name, entry] : header.items()) names.push_back(name);
+  EXPECT_EQ(names,
+            (std::vector<std::string>{"__metadata__", "actor.W", "actor.b", "normalizer.count",
+                                      "normalizer.mean", "normalizer.var"}));
+  EXPECT_EQ(ReadMetadata(path_).at("config"), "x");
+  LoadPolicy(path_, loaded.algorithm, normalizer);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(loaded.algorithm.Params()[i]->value, saved.algorithm.Params()[i]->value);
+  }
+  EXPECT_EQ(normalizer.mean(), statistics.mean());
+  EXPECT_EQ(normalizer.var(), statistics.var());
+  EXPECT_EQ(normalizer.count(), 7);
+}
+
 TEST_F(Checkpoint, FromElsewhereGivesItsPolicy) {
   const auto [header, data] = Foreign();
   Write(Join(header, data));

@@ -143,6 +143,29 @@ TEST_F(Evaluation, AddsNoiseToSampledActionsOnly) {
   }
 }
 
+TEST_F(Evaluation, TrajectoriesHoldEveryStep) {
+  // Always option 1 and mu = -0.75 + 1, from x0 on: state (x, t) before the step, x + 0.25 after.
+  SecondOption algorithm(env_.Spec(), 1);
+  algorithm.Params()[0]->value.setZero();
+  algorithm.Params()[1]->value.setConstant(Real(-0.75));
+  CsvTable table = NewTrajectory(env_.Spec(), 2);
+  EXPECT_EQ(table.columns, (std::vector<std::string>{"episode", "step", "o", "P0", "P1", "a0",
+                                                     "reward", "obs0", "obs1"}));
+  Evaluate(algorithm, normalizer_, env_, 2, /*sample_action=*/false, 5,
+           [&](const EvalStep& step) { Append(step, table); });
+  std::vector<double> expected;
+  Rng resets(5, "eval.reset");
+  for (const double episode : {0, 1}) {
+    double x = resets.Uniform(-1, 1);
+    for (double t = 0; t < 7 && x <= 2; ++t) {
+      const double next = x + 0.25;
+      expected.insert(expected.end(), {episode, t, 1, 0, 1, 0.25, -next * next, x, t});
+      x = next;
+    }
+  }
+  EXPECT_EQ(table.values, expected);
+}
+
 TEST_F(Evaluation, ForwardWritesTheNetworksOutputs) {
   TestFolder dir;
   algorithm_.Params()[0]->value << Real(0.5), Real(0.25);
