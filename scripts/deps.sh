@@ -11,6 +11,9 @@ packages="
   clang-format clang-tidy
 "
 
+# FILM=1: what draws and codes films.
+[ "${FILM:-0}" = 1 ] && packages="$packages libosmesa6 ffmpeg"
+
 missing=
 for package in $packages; do
   status=$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null) || status=

@@ -12,10 +12,11 @@ find src -name '*.cc' -o -name '*.h' | sort | xargs awk '
     may["rollout"] = " base nn dist env "
     may["algo"] = may["rollout"] "rollout "
     may["harness"] = may["algo"] "algo embedded build_info.h "
-    may["cli"] = may["harness"] "harness "
+    may["render"] = " base env "
+    may["cli"] = may["harness"] "harness render "
     may["env"] = may["env"] "embedded "
     # Where third-party headers may appear; Eigen and the standard library may appear anywhere.
-    home["mujoco"] = "^src/env/"
+    home["mujoco"] = "^src/(env|render)/"
     home["toml++"] = "^src/harness/config\\.cc$"
     home["nlohmann"] = "^src/harness/(manifest|checkpoint|record|interpret)\\.cc$"
     home["CLI"] = "^src/cli/"

@@ -1,6 +1,6 @@
 #pragma once
 // A task simulated by MuJoCo: all that the tasks have in common. Included by tasks, their registry,
-// replay and tests only: nothing else sees MuJoCo.
+// replay, src/render and tests only: nothing else sees MuJoCo.
 
 #include <mujoco/mujoco.h>
 
@@ -55,6 +55,8 @@ class MujocoEnv : public Env {
   /// The numbers of an episode that are in the model, not in qpos (where a target is): none, in
   /// most tasks. Part of the saved state; Reset draws them, ResetTo takes them as they are.
   virtual std::span<double> Target() { return {}; }
+  /// Seconds of an environment step.
+  double dt() const { return model_->opt.timestep * frame_skip_; }
   /// File name of the model without its ending, "gym_hopper".
   const std::string& ModelName() const { return model_name_; }
   /// The simulator itself, for the tasks, replay, parity and tests.
@@ -94,8 +96,6 @@ class MujocoEnv : public Env {
   virtual Outcome Judge(double before, double after, std::span<const double> a) const = 0;
   virtual void Observe(ObservationWriter& obs) const = 0;
 
-  /// Seconds of an environment step.
-  double dt() const { return model_->opt.timestep * frame_skip_; }
   int frame_skip() const { return frame_skip_; }
   /// Throw Error when the model has no such body, geom, site or sensor.
   int BodyId(const char* name) const { return Id(mjOBJ_BODY, name); }
