@@ -74,12 +74,14 @@ reproduce: deps  ## rerun the paper, or SUITE=quick (FIDELITY= SEEDS= TASKS= ALG
 # Debian's Python, which sees Debian's packages. -B: no caches beside the sources.
 PYTHON := /usr/bin/python3 -B
 CHOICE  = $(addprefix --experiment ,$(EXPERIMENTS))
-report: deps  ## write tables, claims and figures: results/REPORT.md, report.html (EXPERIMENTS=ci: in results/ci)
+report: deps  ## write tables, claims and figures: results/REPORT.md, report.html (EXPERIMENTS=ci: in results/ci; MINE=)
 	@$(COMPILE) --target option2vec
 	@$(O2V) params --csv > results/params.csv.new && mv results/params.csv.new results/params.csv
 	@$(O2V) list switches > results/switches.txt.new && mv results/switches.txt.new results/switches.txt
-	@$(PYTHON) -m plots.report $(CHOICE) $(if $(CHOICE),--out results/$(firstword $(EXPERIMENTS)))
-	@$(if $(CHOICE),,$(PYTHON) -m plots.front)
+	@$(PYTHON) -m plots.long_table
+	@$(PYTHON) -m plots.report $(CHOICE) $(addprefix --mine ,$(MINE)) \
+	    $(if $(CHOICE),--out results/$(firstword $(EXPERIMENTS)),$(if $(MINE),--out results/mine))
+	@$(if $(CHOICE)$(MINE),,$(PYTHON) -m plots.front)
 
 plots: deps  ## draw the figures alone: plots/*.svg and *.png
 	@for script in plots/fig_*.py; do $(PYTHON) -m plots.$$(basename $$script .py) || exit; done

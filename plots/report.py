@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from plots import (fig_cost, fig_embedding, fig_learning_curves, fig_options, fig_parameters,
-                   fig_transfer)
+                   fig_transfer, mine)
 from plots.claims import (AUTHORS_PARAMETERS, CLAIMS, FAILS, GRADIENT_BOUND, HOLDS, OURS, UNDECIDED,
                           UNMEASURED, Claim, Evidence, Finding, parameter_counts, verdict_of)
-from plots.records import (FIDELITIES, METHODS, PAIRS, SEEDS, TASKS, Cell, DamagedFile,
-                           Key, Rows, load_cells)
+from plots.records import (FIDELITIES, GRID_METHODS, METHODS, PAIRS, SEEDS, TASKS, Cell,
+                           DamagedFile, Key, Rows, joined, load_cells)
 from plots.samples import Sample, Samples, author_samples, original_code, our_samples
 from plots.statistics import (CONFIDENCE, Moments, bootstrap, holm, improvement, iqm,
                               mean_improvement, one_sample, welch)
@@ -88,8 +88,9 @@ def _picture(drawing: Drawing) -> Block:
 
 
 def _introduction(cells: Mapping[Key, Cell]) -> list[Block]:
-    runs = [run for key, cell in cells.items() if not key.variant for run in cell.runs]
-    grid = len(FIDELITIES) * len(ALL_TASKS) * len(METHODS) * len(SEEDS)
+    runs = [run for key, cell in cells.items() if not key.variant and key not in joined
+            for run in cell.runs]
+    grid = len(FIDELITIES) * len(ALL_TASKS) * len(GRID_METHODS) * len(SEEDS)
     found = sum(run.seed in SEEDS for run in runs)
     partial = "the whole grid" if found == grid else "a partial grid: see Missing runs"
     folders = ", ".join(f"`{name}`" for name in sorted({run.path.parts[-5] for run in runs}))
@@ -525,12 +526,12 @@ def _missing(cells: Mapping[Key, Cell]) -> list[Block]:
 
 def _missing_seeds(task: str, fidelity: str, cells: Mapping[Key, Cell]) -> str:
     lacking: dict[str, list[str]] = {}
-    for method in METHODS:
+    for method in GRID_METHODS:
         cell = cells.get(Key(fidelity, "", task, method))
         seeds = set(SEEDS) - {run.seed for run in cell.runs if cell} if cell else set(SEEDS)
         if seeds:
             lacking.setdefault(ranges(sorted(seeds)), []).append(METHODS[method])
-    return "; ".join(f"seeds {seeds} of {'all methods' if len(m) == len(METHODS) else ', '.join(m)}"
+    return "; ".join(f"seeds {seeds} of {'all methods' if len(m) == len(GRID_METHODS) else ', '.join(m)}"
                      for seeds, m in lacking.items()) or "nothing"
 
 
@@ -545,8 +546,12 @@ def main() -> None:
                         help="folder of results/ (again for more; default: all but quick and ci)")
     parser.add_argument("--out", type=Path, help="folder of the report and, then, of its figures "
                         "(default: --results, and plots/ for the figures)")
+    parser.add_argument("--mine", type=Path, action="append", default=[],
+                        help="runs of one's own: a folder of them, or a table (again for more)")
     options = parser.parse_args()
     try:
+        for message in mine.join(options.mine):
+            print(f"report: left out: {message}", file=sys.stderr)
         blocks, drawings = build(options.results, options.experiment)
     except (DamagedFile, FileNotFoundError) as error:
         sys.exit(f"report: {error}")

@@ -441,7 +441,7 @@ void AddFilm(CLI::App& app) {
   film->callback([opt] {
     RequireVideoName(opt->out);
     const auto [width, height] = ReadSize(opt->size);
-    Policy policy = LoadPolicyFile(opt->checkpoint, opt->request);
+    LoadedPolicy policy = LoadPolicyFile(opt->checkpoint, opt->request);
     const EnvSpec& spec = policy.env->Spec();
     const bool strip = opt->out.extension() == ".png";
     std::signal(SIGINT, [](int signal) { stop_signal = signal; });
