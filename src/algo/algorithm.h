@@ -124,6 +124,7 @@ class Algorithm : public Learner, public Policy, public Stages {};
 /// A registry line.
 struct AlgorithmEntry {
   std::string id;
+  std::string name;  // in tables and figures, the authors' included
   std::unique_ptr<Algorithm> (*make)(const AlgorithmInput&);
   int revision;  // of its code, counted up by a change that moves its results
 };

@@ -4,13 +4,13 @@
 
 namespace o2v {
 
-#define O2V_ALGO(id, make, revision) std::unique_ptr<Algorithm> make(const AlgorithmInput&);
+#define O2V_ALGO(id, name, make, revision) std::unique_ptr<Algorithm> make(const AlgorithmInput&);
 #include "algo/list.inc"
 #undef O2V_ALGO
 
 const std::vector<AlgorithmEntry>& AlgorithmRegistry() {
   static const std::vector<AlgorithmEntry> registry = {
-#define O2V_ALGO(id, make, revision) {id, make, revision},
+#define O2V_ALGO(id, name, make, revision) {id, name, make, revision},
 #include "algo/list.inc"
 #undef O2V_ALGO
   };

@@ -114,7 +114,9 @@ void ListTasks() {
 }
 
 void ListAlgorithms() {
-  for (const AlgorithmEntry& entry : AlgorithmRegistry()) std::cout << entry.id << "\n";
+  std::vector<std::vector<std::string>> lines = {{"algorithm", "name"}};
+  for (const AlgorithmEntry& entry : AlgorithmRegistry()) lines.push_back({entry.id, entry.name});
+  std::cout << AlignColumns(lines);
 }
 
 void ListSwitches() {

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <tuple>
 
+#include "algo/algorithm.h"
 #include "base/align.h"
 #include "base/check.h"
 #include "base/files.h"
@@ -22,16 +23,6 @@ namespace fs = std::filesystem;
 
 constexpr std::int64_t kMillion = 1'000'000;    // [environment steps] return_at_1M's
 constexpr std::uint64_t kBootstrapSeed = 2021;  // any number: makes the intervals repeatable
-
-// Method ids and the names in the authors' tables.
-const std::map<std::string, std::string, std::less<>> kPublishedNames = {
-    {"ppo", "PPO"},
-    {"ppoc", "PPOC"},
-    {"oc", "OC"},
-    {"ahp_ppo", "AHP+PPO"},
-    {"dac_ppo", "DAC+PPO"},
-    {"iopg", "IOPG"},
-    {"option2vec", "Option2Vec"}};
 
 /// Rows of an embedded reference file, without its header.
 std::vector<std::vector<std::string>> ReferenceRows(std::string_view name) {
@@ -129,18 +120,19 @@ std::string Four(double x) {
 
 std::optional<Published> PublishedReturn(const std::string& task, const std::string& algorithm,
                                          std::int64_t step) {
-  const auto name = kPublishedNames.find(algorithm);
-  if (name == kPublishedNames.end()) return std::nullopt;
+  const auto& methods = AlgorithmRegistry();
+  const auto method = std::ranges::find(methods, algorithm, &AlgorithmEntry::id);
+  if (method == methods.end()) return std::nullopt;
   const bool pair = SplitTasks(task).size() > 1;
   if (step >= kMillion && (!pair || step == kMillion || step >= 2 * kMillion)) {
     // suite,env,algorithm,embed_dim,run,steps_logged,return_at_1M,return_last
     // pair,first_task,second_task,algorithm,embed_dim,run,return_task1_end,return_task2_end,...
     std::vector<double> returns;
     for (const auto& row : ReferenceRows(pair ? "transfer_runs.csv" : "single_task_runs.csv")) {
-      if (pair && row.at(0) == task && row.at(3) == name->second) {
+      if (pair && row.at(0) == task && row.at(3) == method->name) {
         returns.push_back(std::stod(row.at(step == kMillion ? 6 : 7)));
       }
-      if (!pair && row.at(0) == "final" && row.at(1) == task && row.at(2) == name->second) {
+      if (!pair && row.at(0) == "final" && row.at(1) == task && row.at(2) == method->name) {
         returns.push_back(std::stod(row.at(6)));
       }
     }
@@ -149,7 +141,7 @@ std::optional<Published> PublishedReturn(const std::string& task, const std::str
   }
   std::vector<std::pair<std::int64_t, Published>> curve;  // env or pair,algorithm,step,mean,std,n
   for (const auto& row : ReferenceRows(pair ? "transfer_curves.csv" : "single_task_curves.csv")) {
-    if (row.at(0) != task || row.at(1) != name->second) continue;
+    if (row.at(0) != task || row.at(1) != method->name) continue;
     curve.emplace_back(std::stoll(row.at(2)),
                        Published{std::stod(row.at(3)), std::stod(row.at(4)), std::stoi(row.at(5))});
   }

@@ -67,7 +67,7 @@ TEST_F(Program, AnUnreadableCheckpointExitsWith1AndOneLine) {
 
 TEST_F(Program, ListsNameTasksMethodsAndSwitches) {
   EXPECT_NE(Run("list tasks").out.find("HumanoidStandup-v2"), std::string::npos);
-  EXPECT_NE(Run("list algorithms").out.find("option2vec\n"), std::string::npos);
+  EXPECT_NE(Run("list algorithms").out.find("\ndac_onestep  DAC-OneStep\n"), std::string::npos);
   const std::string switches = Run("list switches").out;
   EXPECT_NE(switches.find("o2v_dropout"), std::string::npos);
   EXPECT_NE(switches.find("[0, 0.9]"), std::string::npos) << "the values that it takes";
