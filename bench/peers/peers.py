@@ -35,7 +35,7 @@ class Program:
     def cpu_seconds(self, steps: int, folder: Path) -> float:
         """Of one run."""
         command = [part.format(folder=folder) for part in self.command]
-        process = subprocess.Popen([*command, str(steps), *self.after],
+        process = subprocess.Popen([*command, str(steps), *self.after], cwd=folder,
                                    env=os.environ | {"OMP_NUM_THREADS": "1",
                                                      "MKL_NUM_THREADS": "1",
                                                      "CUDA_VISIBLE_DEVICES": ""},
@@ -52,8 +52,8 @@ def programs(task: str) -> list[Program]:
     name = task.removesuffix("-v2")
     own, bench = ROOT / "build/release/option2vec", ROOT / "build/release/bench/o2v_bench"
     python = [str(PYTHON), "-W", "ignore"]
-    # gymnasium's -v5 gives Ant the contact forces as observations, which ours and -v4 have not.
-    twin = f"{name}-v5" if name == "HalfCheetah" else f"{name}-v4"
+    # Of -v5 Ant computes contact forces, which ours does not.
+    twin = f"{name}-v4"
     return [
         Program(f"PPO, {name}", "option2vec",
                 [str(own), "train", "--task", task, "--algo", "ppo", "--out", "{folder}/run",
@@ -64,9 +64,9 @@ def programs(task: str) -> list[Program]:
         Program(f"steps alone, {name}", "gymnasium",
                 [*python, str(PEERS / "step_gymnasium.py"), twin], 5),
         Program(f"steps alone, {name}", "EnvPool, 1 task",
-                [*python, str(PEERS / "step_envpool.py"), f"{name}-v4"], 5, ("1",)),
+                [*python, str(PEERS / "step_envpool.py"), twin], 5, ("1",)),
         Program(f"steps alone, {name}", "EnvPool, 64 tasks",
-                [*python, str(PEERS / "step_envpool.py"), f"{name}-v4"], 5, ("64",)),
+                [*python, str(PEERS / "step_envpool.py"), twin], 5, ("64",)),
     ]
 
 
