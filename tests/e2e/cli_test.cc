@@ -22,6 +22,15 @@ bool OneLine(const std::string& text) {
   return !text.empty() && text.find('\n') == text.size() - 1;
 }
 
+/// The text after a line break, with one blank where there were several.
+std::string Squeezed(const std::string& text) {
+  std::string squeezed = "\n";
+  for (const char c : text) {
+    if (c != ' ' || squeezed.back() != ' ') squeezed += c;
+  }
+  return squeezed;
+}
+
 TEST_F(Program, HelpWithExamplesSucceedsForEverySubcommand) {
   EXPECT_EQ(Run("--help").code, 0);
   for (const char* name :
@@ -66,8 +75,14 @@ TEST_F(Program, AnUnreadableCheckpointExitsWith1AndOneLine) {
 }
 
 TEST_F(Program, ListsNameTasksMethodsAndSwitches) {
-  EXPECT_NE(Run("list tasks").out.find("HumanoidStandup-v2"), std::string::npos);
-  EXPECT_NE(Run("list algorithms").out.find("\ndac_onestep  DAC-OneStep\n"), std::string::npos);
+  const std::string tasks = Run("list tasks").out;  // task, S, A, time limit; then the pairs
+  for (const char* row :
+       {"task S A time limit [steps]", "Reacher-v2 11 2 50", "HumanoidStandup-v2 376 17 1000",
+        "dm-fish-upright 21 5 1000", "Fish dm-fish-upright dm-fish-downleft"}) {
+    EXPECT_NE(Squeezed(tasks).find(std::string("\n") + row + "\n"), std::string::npos) << row;
+  }
+  EXPECT_NE(Squeezed(Run("list algorithms").out).find("\ndac_onestep DAC-OneStep\n"),
+            std::string::npos);
   const std::string switches = Run("list switches").out;
   EXPECT_NE(switches.find("o2v_dropout"), std::string::npos);
   EXPECT_NE(switches.find("[0, 0.9]"), std::string::npos) << "the values that it takes";
@@ -93,6 +108,10 @@ TEST_F(Program, ParamsPrintsThePapersRatio) {
   for (const char* size : {" 11085 ", " 31615 ", " 30598 "}) {
     EXPECT_NE(text.find(size), std::string::npos) << size;
   }
+  const std::string csv = Run("params --csv").out;
+  EXPECT_TRUE(csv.starts_with("task,S,A,method,fidelity,width,counted,used,share\n")) << csv;
+  EXPECT_NE(csv.find("\nHalfCheetah-v2,17,6,option2vec,released,64,30598,30484,\n"),
+            std::string::npos);
 }
 
 TEST_F(Program, TrainsIntoAFolderThatItThenRefusesOrLeavesAsItIs) {
@@ -187,6 +206,11 @@ TEST_F(Program, InterpretsTheEmbeddingRepeatably) {
   EXPECT_EQ(Run("interpret run --episodes 2 --out c.json").code, 2);
   ASSERT_EQ(Run("interpret run --episodes 2 --seed 1 --out c.csv").code, 0);
   EXPECT_NE(ReadFile(dir_ / "c.csv"), ReadFile(dir_ / path));
+  ASSERT_EQ(Run("interpret run --episodes 1 --seed 4 --delta 0.25 --out d.csv").code, 0);
+  const CsvTable other = ReadCsv(dir_ / "d.csv");
+  EXPECT_EQ(table.At(0, table.Column("delta")), 1) << "the default";
+  EXPECT_EQ(other.At(0, other.Column("delta")), 0.25);
+  EXPECT_NE(ReadFile(dir_ / "d.json").find("\"seed\": 4"), std::string::npos);
 }
 
 TEST_F(Program, InterpretsTheLastTaskOfAPairUnlessToldOtherwise) {
@@ -250,6 +274,11 @@ TEST_F(Program, ReplayPassesOnItsOwnOutputAndFailsOnAnother) {
   EXPECT_EQ(fail.code, 1) << fail.err;
   EXPECT_EQ(fail.out.substr(0, 4), "FAIL");
   EXPECT_NE(fail.out.find("row 1"), std::string::npos) << fail.out;
+  EXPECT_NE(fail.out.find("(tolerance 1e-09)"), std::string::npos) << fail.out;
+  const Outcome wide = Run(replay + "in.csv --tolerance 1e3");
+  EXPECT_EQ(wide.code, 0) << wide.err;
+  EXPECT_EQ(wide.out.substr(0, 4), "PASS");
+  EXPECT_NE(wide.out.find("(tolerance 1000)"), std::string::npos) << wide.out;
   const Outcome pass = Run(replay + "own.csv");
   EXPECT_EQ(pass.code, 0) << pass.out;
   EXPECT_EQ(pass.out.substr(0, 4), "PASS");
@@ -285,6 +314,42 @@ TEST_F(Program, JobsRunThenDisappearThenSummarise) {
     EXPECT_TRUE(damaged.err.starts_with(record + ": ")) << command << ": " << damaged.err;
     EXPECT_TRUE(damaged.err.ends_with("\n1 records refused\n")) << command << ": " << damaged.err;
   }
+}
+
+TEST_F(Program, JobsAndProgressGoByTheRecords) {
+  WriteFileAtomically(dir_ / "tiny.toml",
+                      "[experiment]\ntasks = ['InvertedPendulum-v2']\nalgorithms = ['ppo']\n"
+                      "fidelities = ['paper']\nseeds = [0, 1, 2, 3]\n"
+                      "[run]\nsteps = 64\n[algo.ppo]\nrollout = 64\n");
+  EXPECT_EQ(Run("progress tiny.toml --at-once 2").out,
+            "4 runs: 0 done, 4 left, time left known after the first\n");
+  const std::string folder = "results/tiny/paper/InvertedPendulum-v2/ppo/";
+  ASSERT_EQ(Run("train --config tiny.toml --task InvertedPendulum-v2 --algo ppo --seed 0 --out " +
+                folder + "seed-000")
+                .code,
+            0);
+  const std::string record = folder + "seed-000.json";
+  const auto set = [&](const std::string& key, const std::string& value) {
+    std::string json = ReadFile(dir_ / record);
+    const std::size_t begin = json.find("\"" + key + "\": ") + key.size() + 4;
+    json.replace(begin, json.find(',', begin) - begin, value);
+    WriteFileAtomically(dir_ / record, json);
+  };
+  set("cpu_seconds", "7200.0");  // two hours each: six are left
+  EXPECT_EQ(Run("progress tiny.toml").out,
+            "4 runs: 1 done, 3 left, about 6.0 CPU hours, 6.0 h with 1 at a time\n");
+  EXPECT_EQ(Run("progress tiny.toml --at-once 4").out,
+            "4 runs: 1 done, 3 left, about 6.0 CPU hours, 1.5 h with 4 at a time\n");
+  EXPECT_EQ(Run("progress tiny.toml --seeds 0,2").out,
+            "2 runs: 1 done, 1 left, about 2.0 CPU hours, 2.0 h with 1 at a time\n");
+  set("revision", "0");
+  const Outcome jobs = Run("jobs tiny.toml");
+  EXPECT_EQ(std::count(jobs.out.begin(), jobs.out.end(), '\n'), 3) << jobs.out;
+  EXPECT_EQ(jobs.out.find("--seed 0 "), std::string::npos) << "not made again by itself";
+  EXPECT_EQ(jobs.err, folder + "seed-000: by an older revision of the method\n");
+  EXPECT_TRUE(
+      Run("progress tiny.toml")
+          .out.starts_with("4 runs: 1 done (1 by older revisions of their methods), 3 left"));
 }
 
 }  // namespace
