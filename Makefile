@@ -9,13 +9,13 @@ PRESET := $(if $(filter 1,$(SAN)),asan,release)
 O2V    := build/$(PRESET)/option2vec
 COMPILE = cmake --preset $(PRESET) > /dev/null && cmake --build --preset $(PRESET)
 
-.PHONY: help deps build test clean gradcheck parity theory oracles bench bench-peers reproduce lint lint-tidy format golden report plots torture fuzz
+.PHONY: help deps build test clean gradcheck parity theory oracles bench bench-peers reproduce policies watch timelines lint lint-tidy format golden report plots torture fuzz
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-deps:  ## install missing packages (PHYSICS=debian: Debian's libmujoco, not PyPI's faster one)
-	@scripts/deps.sh
+deps:  ## install missing packages (PHYSICS=debian: Debian's libmujoco, not PyPI's faster one; FILM=1: for films)
+	@FILM=$(FILM) scripts/deps.sh
 	@PHYSICS=$(PHYSICS) scripts/deps_physics.sh
 
 build: deps  ## build program, tests and benches (SAN=1: with ASan and UBSan)
@@ -70,6 +70,36 @@ reproduce: deps  ## rerun the paper, or SUITE=quick (FIDELITY= SEEDS= TASKS= ALG
 	    GRID="$(GRID) --at-once $(JOBS)" xargs -P $(JOBS) -d '\n' -r -n 1 scripts/run_job.sh
 	@$(O2V) summary $$(ls -d $(foreach suite,$(SUITES),results/$(basename $(notdir $(suite)))) 2> /dev/null)
 	@if [ $(SUITE) = paper ]; then $(MAKE) --no-print-directory report; fi
+
+# Records do not hold a policy, so that these runs are made anew, in a folder of their own.
+POLICY_GRID = single_task transfer --fidelity paper,released --algos option2vec --seeds 0 \
+              $(if $(TASKS),--tasks $(TASKS)) --results runs/policies
+policies: deps  ## train Option2Vec, seed 0, and write results/policies (TASKS= JOBS=)
+	@$(COMPILE) --target option2vec
+	@$(O2V) jobs $(POLICY_GRID) | \
+	    GRID="$(POLICY_GRID) --at-once $(JOBS)" xargs -P $(JOBS) -d '\n' -r -n 1 scripts/run_job.sh
+	@scripts/policies.sh $(O2V) runs/policies
+
+TASK   ?= HalfCheetah-v2
+WATCHED = $(TASK)-$(if $(filter file,$(origin FIDELITY)),released,$(FIDELITY))
+watch:  ## evaluate and film a trained policy, build/films/*.mp4 (TASK=HalfCheetah-v2 FIDELITY=released)
+	@$(MAKE) --no-print-directory deps FILM=1
+	@$(COMPILE) --target option2vec
+	@mkdir -p build/films
+	@$(O2V) eval --checkpoint results/policies/$(WATCHED).safetensors --episodes 3 --action mean
+	@$(O2V) film --checkpoint results/policies/$(WATCHED).safetensors --action mean --size 480x360 \
+	    --out build/films/$(WATCHED).mp4
+
+timelines: deps  ## draw the options over an episode of each trained policy: build/timelines
+	@$(COMPILE) --target option2vec
+	@mkdir -p build/timelines
+	@for file in results/policies/*.safetensors; do \
+	    $(O2V) eval --checkpoint $$file --episodes 5 --action mean > /dev/null \
+	        --trajectory build/timelines/$$(basename $$file .safetensors).csv || exit; \
+	done
+	@$(PYTHON) -m plots.timeline --out build/timelines $(patsubst \
+	    results/policies/%.safetensors,build/timelines/%.csv,$(wildcard results/policies/*.safetensors))
+	@cp build/timelines/options.csv results/policies/options.csv
 
 # Debian's Python, which sees Debian's packages. -B: no caches beside the sources.
 PYTHON := /usr/bin/python3 -B
