@@ -98,7 +98,7 @@ std::array<int, 3> OptionColor(int o) {
   return kColors[std::size_t(o) % std::size(kColors)];
 }
 
-Bands BandsOf(int height) { return {std::max(height / 20, 16), std::max(height / 40, 4)}; }
+Bands BandsOf(int height) { return {std::max(height / 20, 18), std::max(height / 40, 4)}; }
 
 struct Renderer::Parts {
   Parts(const MujocoEnv& simulated, int w, int h) : env(simulated), width(w), height(h) {}
@@ -164,11 +164,12 @@ void Renderer::Draw(const Captions& captions, Image& image) {
   MoveFloor(p.scene);
 
   const auto [bar, time_line] = BandsOf(p.height);
-  mjr_render({0, 0, p.width, p.height}, &p.scene, &p.context);
-  mjr_overlay(mjFONT_NORMAL, mjGRID_TOPLEFT, {0, 0, p.width, p.height}, captions.names.c_str(),
+  const mjrRect picture = {0, bar + time_line, p.width, p.height - bar - time_line};
+  mjr_render(picture, &p.scene, &p.context);
+  mjr_overlay(mjFONT_NORMAL, mjGRID_TOPLEFT, picture, captions.names.c_str(),
               captions.values.c_str(), &p.context);
   const mjrRect line = {0, 0, p.width, time_line}, above = {0, time_line, p.width, bar};
-  mjr_rectangle(line, 0.15f, 0.15f, 0.15f, 1);  // steps to come
+  for (const mjrRect& band : {line, above}) mjr_rectangle(band, 0.15f, 0.15f, 0.15f, 1);
   const int n = int(captions.options.size()), length = std::max({captions.time_limit, n, 1});
   const auto x = [&](int step) { return int(std::int64_t{step} * p.width / length); };
   for (int begin = 0, end; begin < n; begin = end) {  // a rectangle an execution of an option

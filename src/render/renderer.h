@@ -32,8 +32,8 @@ struct Captions {
 /// RGB of option o: colours of Okabe and Ito, which the colour-blind tell apart.
 std::array<int, 3> OptionColor(int o);
 
-/// Heights [pixels] of what is drawn over the lower end of a picture this high: the time line at
-/// the very end, the bar of the active option above it.
+/// Heights [pixels] of what is drawn under the picture, of an image this high: the time line at the
+/// very end, the bar of the active option above it.
 struct Bands {
   int bar, time_line;
 };
