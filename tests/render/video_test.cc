@@ -66,7 +66,10 @@ TEST_F(Videos, ThatFailLeaveNothingAndSayWhy) {
 }
 
 TEST_F(Videos, ThatAreGivenUpLeaveNothing) {
-  { Video(dir_ / "x.gif", 2, 1, 20, Fake("cat > \"$file\"\n")).Write(Frame(1)); }
+  {
+    Video video(dir_ / "x.gif", 2, 1, 20, Fake("cat > \"$file\"\n"));
+    while (!fs::exists(dir_ / "x.gif.tmp")) video.Write(Frame(1));
+  }
   EXPECT_EQ(Files(), std::vector<std::string>{});
 }
 
