@@ -104,16 +104,23 @@ timelines: deps  ## draw the options over an episode of each trained policy: bui
 # Debian's Python, which sees Debian's packages. -B: no caches beside the sources.
 PYTHON := /usr/bin/python3 -B
 CHOICE  = $(addprefix --experiment ,$(EXPERIMENTS))
-report: deps  ## write tables, claims and figures: results/REPORT.md, report.html (EXPERIMENTS=ci: in results/ci; MINE=)
-	@$(COMPILE) --target option2vec
-	@$(O2V) params --csv > results/params.csv.new && mv results/params.csv.new results/params.csv
-	@$(O2V) list switches > results/switches.txt.new && mv results/switches.txt.new results/switches.txt
+# The program writes its tables where it is newer than they are; a fresh clone has them, unbuilt.
+results/params.csv: ARGUMENTS = params --csv
+results/switches.txt: ARGUMENTS = list switches
+results/params.csv results/switches.txt: $(wildcard $(O2V))
+	@[ -x $(O2V) ] || { scripts/deps.sh && $(COMPILE) --target option2vec; }
+	@$(O2V) $(ARGUMENTS) > $@.new && mv $@.new $@
+
+PLOTTING := python3 python3-numpy python3-scipy python3-matplotlib
+report: results/params.csv results/switches.txt  ## write results/REPORT.md, report.html, README's box (EXPERIMENTS=ci: in results/ci; MINE=)
+	@scripts/deps.sh $(PLOTTING)
 	@$(PYTHON) -m plots.long_table
 	@$(PYTHON) -m plots.report $(CHOICE) $(addprefix --mine ,$(MINE)) \
 	    $(if $(CHOICE),--out results/$(firstword $(EXPERIMENTS)),$(if $(MINE),--out results/mine))
 	@$(if $(CHOICE)$(MINE),,$(PYTHON) -m plots.front)
 
-plots: deps  ## draw the figures alone: plots/*.svg and *.png
+plots:  ## draw the figures alone: plots/*.svg and *.png
+	@scripts/deps.sh $(PLOTTING)
 	@for script in plots/fig_*.py; do $(PYTHON) -m plots.$$(basename $$script .py) || exit; done
 
 lint: deps  ## check formatting, include layering, cited sections, links and lengths of the pages

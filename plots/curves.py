@@ -1,4 +1,8 @@
-"""Panels of learning curves: tasks by sources (paper, released, the authors' logs)."""
+"""Panels of learning curves: tasks by sources (paper, released, the authors' logs).
+
+Option2Vec and the best of its rivals stand out: thick, with a band. The others are thin. Beyond the
+last step each method's end point has an interval.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -8,15 +12,20 @@ from matplotlib.lines import Line2D
 
 from plots.records import MILLION
 from plots.samples import Sample, Samples
-from plots.style import GREY, legend_above, line_of, new_figure, thin
+from plots.statistics import one_sample
+from plots.style import (GREY, INK, LOOKS, METHODS, Margins, legend_above, line_of, new_figure,
+                         strip, thin)
 
+OURS = "option2vec"
 BEHIND = {"color": GREY, "linestyle": "--", "zorder": 1}  # the authors' line
 TITLES = {"paper": "ours, paper", "released": "ours, released", "authors": "authors' logs"}
-NOTE = ("environment steps [millions]\n"
-        "return: mean of the last 20 training episodes (smoothing window 20); band: mean $\\pm$ "
-        "one standard deviation over the n seeds")
-AUTHORS_NOTE = ("\nbehind our curves the authors' Option2Vec; their other methods are in the panels "
-                "of their logs")
+NOTE = (
+    "Return: mean of the last 20 training episodes. Option2Vec and the best rival (highest mean at "
+    "the end) are thick, with a band of one standard deviation over the n seeds; right of the "
+    "curves, the mean of every method at the end with its 95 % interval (t), cut where it leaves "
+    "the panel. Dashed grey: the authors' Option2Vec. The authors shade std/√n in their figures, "
+    "where the paper's text says standard deviation.")
+MARGIN, SPACING = 0.05, 0.03  # of the end points, as parts of the last step
 
 
 def draw_curves(tasks: Sequence[str], methods: Sequence[str], sources: Mapping[str, Samples],
@@ -24,37 +33,62 @@ def draw_curves(tasks: Sequence[str], methods: Sequence[str], sources: Mapping[s
     """A row a task, a column a source; with `blocks`, so many tasks beside each other. Behind our
     curves, in grey, the authors' of each task in `behind`."""
     rows, columns = -(-len(tasks) // blocks), len(sources) * blocks
-    figure, axes = new_figure(3.1 * columns, 1.9 * rows + 0.9, rows, columns, sharex=True)
-    present: set[str] = set()
+    present = {m for m in methods for samples in sources.values() for t in tasks
+               if (t, m) in samples}
+    figure, axes = new_figure(3.1 * columns, 1.45, rows, columns, Margins(columns=0.45),
+                              legend=strip(len(present) + 1, 5), sharex=True)
     for place, task in enumerate(tasks):
         block, row = divmod(place, rows)
         panels = axes[row][block * len(sources):(block + 1) * len(sources)]
         for panel, (source, samples) in zip(panels, sources.items()):
             found = {m: samples[task, m] for m in methods if (task, m) in samples}
             if task in behind and source != "authors":
-                _curve(panel, behind[task], BEHIND)
+                curve = behind[task].curve
+                panel.plot(thin(curve.step) / MILLION, thin(curve.mean), **BEHIND)
+            best = max((m for m in found if m != OURS), default=None,
+                       key=lambda m: found[m].moments.mean)
             for method, sample in reversed(found.items()):  # Option2Vec on top
-                _curve(panel, sample, line_of(method, len(thin(sample.curve.step))))
-            panel.set_title(f"{task}\n{TITLES[source]}: {_coverage(found, methods)}")
-            present |= found.keys()
+                _curve(panel, method, sample, method in (OURS, best))
+            panel.set_title(f"{task}, {TITLES[source]}\n{_coverage(found, methods)}",
+                            loc="left")
         limits = [limit for panel in panels if panel.lines for limit in panel.get_ylim()]
-        for panel in panels if limits else []:
+        for panel, samples in zip(panels, sources.values()) if limits else []:
             panel.set_ylim(min(limits), max(limits))
+            _ends(panel, {m: samples[task, m] for m in methods if (task, m) in samples})
         panels[0].set_ylabel("return [reward]")
-    figure.supxlabel(NOTE + (AUTHORS_NOTE if "authors" in sources else ""), fontsize=8)
+    for panel in axes[-1]:
+        panel.set_xlabel("environment steps [millions]")
     legend_above(figure, present, (Line2D([], [], **BEHIND), "authors' Option2Vec"))
     return figure
 
 
-def _curve(panel: Axes, sample: Sample, line: dict) -> None:
+def _curve(panel: Axes, method: str, sample: Sample, stands_out: bool) -> None:
     curve = sample.curve
     step, mean, std = thin(curve.step) / MILLION, thin(curve.mean), thin(curve.std)
-    low, high = mean - std, mean + std
-    panel.fill_between(step, low, high, alpha=0.15, color=line["color"], linewidth=0,
-                       zorder=line.get("zorder", 2))
-    if line is BEHIND:  # an edge, since PPO's band is grey, too
-        panel.plot(step, low, step, high, color=GREY, linewidth=0.5, zorder=1)
-    panel.plot(step, mean, **line)
+    line = line_of(method, len(step))
+    if stands_out:
+        panel.fill_between(step, mean - std, mean + std, alpha=0.2, color=line["color"],
+                           linewidth=0, zorder=2)
+        panel.plot(step, mean, **line, linewidth=2, zorder=4)
+    else:
+        panel.plot(step, mean, **line | {"markersize": 2.5}, linewidth=0.7, zorder=3)
+
+
+def _ends(panel: Axes, found: Mapping[str, Sample]) -> None:
+    """Means at the end with intervals, a column a method in the order of the legend."""
+    if not found:
+        return
+    last = max(s.horizon for s in found.values()) / MILLION
+    panel.axvline(last, color=INK, linewidth=0.5)
+    for place, (method, sample) in enumerate(found.items()):
+        x, look = last * (1 + MARGIN + SPACING * place), LOOKS[method]
+        low, high = one_sample(sample.moments).interval
+        if sample.moments.n > 1:
+            panel.vlines(x, low, high, color=look.color, linewidth=1.2, zorder=3)
+        panel.plot([x], [sample.moments.mean], color=look.color, marker=look.marker, markersize=3,
+                   markeredgewidth=0, zorder=4)
+    panel.set_xlim(-0.02 * last, last * (1 + 2 * MARGIN + SPACING * (len(METHODS) - 1)))
+    panel.set_xticks([0, last / 2, last])
 
 
 def _coverage(found: Mapping[str, Sample], methods: Sequence[str]) -> str:

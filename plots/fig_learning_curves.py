@@ -1,29 +1,25 @@
 """Learning curves on the ten single tasks (the paper's Figure 4)."""
 
-from collections.abc import Sequence
-from pathlib import Path
-
-from plots.curves import draw_curves
-from plots.records import FIDELITIES, FINITE, INFINITE, METHODS, TASKS, load_cells
-from plots.samples import author_samples, our_samples
+from plots.curves import NOTE, draw_curves
+from plots.inputs import Inputs
+from plots.records import FINITE, INFINITE, METHODS, TASKS
 from plots.style import Drawing, main
 
 
-def draw(results: Path, experiments: Sequence[str] | None = None) -> list[Drawing]:
+def draw(inputs: Inputs) -> list[Drawing]:
     """Three figures: Option2Vec and DAC-OneStep; tasks without termination; tasks with it."""
-    cells = load_cells(results, experiments)
-    authors = author_samples(results / "reference")
+    authors = inputs.sources["authors"]
     behind = {task: authors[task, "option2vec"] for task in TASKS}
-    ours = {fidelity: our_samples(cells, fidelity) for fidelity in FIDELITIES}
-    every = ours | {"authors": authors}
+    ours = {source: s for source, s in inputs.sources.items() if source != "authors"}
     one_step = ("option2vec", "dac_onestep")
     return [
-        Drawing("learning_curves_onestep", "Option2Vec and DAC-OneStep on the ten tasks.",
+        Drawing("figure_4a", f"Figure 4a: Option2Vec and DAC-OneStep on the ten tasks. {NOTE}",
                 draw_curves(TASKS, one_step, ours, behind, blocks=2)),
-        Drawing("learning_curves_infinite", "All methods on the tasks without termination.",
-                draw_curves(INFINITE, tuple(METHODS), every, behind)),
-        Drawing("learning_curves_finite", "All methods on the tasks with termination.",
-                draw_curves(FINITE, tuple(METHODS), every, behind)),
+        Drawing("figure_4b", "Figure 4b: all methods on the tasks without termination. "
+                "Read as Figure 4a.",
+                draw_curves(INFINITE, tuple(METHODS), inputs.sources, behind)),
+        Drawing("figure_4c", "Figure 4c: all methods on the tasks with termination. "
+                "Read as Figure 4a.", draw_curves(FINITE, tuple(METHODS), inputs.sources, behind)),
     ]
 
 

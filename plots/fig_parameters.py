@@ -4,13 +4,11 @@ Counts are those of HalfCheetah-v2 (S = 17, A = 6) with hidden layers of h. Ever
 counts all parameters that a network allocates; sections are those of docs/algorithms.md.
 """
 
-from collections.abc import Sequence
-from pathlib import Path
-
 import numpy as np
 from matplotlib.lines import Line2D
 
-from plots.style import INK, LOOKS, Drawing, Look, legend_above, main, new_figure
+from plots.inputs import Inputs
+from plots.style import INK, LOOKS, Drawing, Look, legend_above, main, new_figure, strip
 
 D, F = 40, 50  # Option2Vec's embedding and the width inside its attention block; spec 2.6
 INIT = 64  # of the initial-option net, not h; spec 2.4, 2.6
@@ -67,11 +65,11 @@ def option2vec_paper(S: int, A: int, K: int, h: int) -> int:
             + (body(S + D, h) + 2 * (h * A + A)) + (body(S + D, h) + h + 1))
 
 
-def draw(results: Path, experiments: Sequence[str] | None = None) -> list[Drawing]:
+def draw(inputs: Inputs) -> list[Drawing]:
     """From formulas alone."""
-    del results, experiments
+    del inputs
     K = np.array([1, 2, 4, 8, 16, 32, 64])
-    figure, [[panel]] = new_figure(6.2, 4.2, 1, 1)
+    figure, [[panel]] = new_figure(7, 3.2, 1, 1, legend=strip(6, 3))
     network, onestep, ours = LOOKS["dac_ppo"], LOOKS["dac_onestep"], LOOKS["option2vec"]
     entries = []
     for label, look, fill, count in (

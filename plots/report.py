@@ -1,84 +1,96 @@
-"""Writes results/REPORT.md and results/report.html, from records and reference numbers only."""
+"""Writes results/REPORT.md, report.html, claims.json and figures/, and the box in README.md, from
+records and reference numbers only."""
 
 import argparse
 import math
-import os
 import sys
 from collections.abc import Mapping, Sequence, Set
 from pathlib import Path
 
 import numpy as np
 
-from plots import (fig_cost, fig_embedding, fig_learning_curves, fig_options, fig_parameters,
-                   fig_transfer, mine)
-from plots.claims import (AUTHORS_PARAMETERS, CLAIMS, FAILS, GRADIENT_BOUND, HOLDS, OURS, UNDECIDED,
-                          UNMEASURED, Claim, Evidence, Finding, parameter_counts, verdict_of)
+from plots import (beyond, fig_aggregate, fig_cost, fig_embedding, fig_learning_curves, fig_options,
+                   fig_options_count, fig_parameters, fig_transfer, ledger, mine)
+from plots.claims import (AUTHORS_PARAMETERS, CHECKS, FAILS, GRADIENT_BOUND, HOLDS, OURS, UNDECIDED,
+                          UNMEASURED, Finding)
+from plots.inputs import Inputs
+from plots.ledger import ALL_TASKS, GRID, NAMES, Judged
 from plots.records import (FIDELITIES, GRID_METHODS, METHODS, PAIRS, SEEDS, TASKS, Cell,
-                           DamagedFile, Key, Rows, joined, load_cells)
-from plots.samples import Sample, Samples, author_samples, original_code, our_samples
+                           DamagedFile, Key, Rows, joined)
+from plots.samples import Sample, Samples, original_code, our_samples
 from plots.statistics import (CONFIDENCE, Moments, bootstrap, holm, improvement, iqm,
                               mean_improvement, one_sample, welch)
-from plots.style import FOLDER, RESULTS, Drawing, inline_svg, save
-from plots.tables import COUNTERS, read_bench, read_interpretations, read_rows, read_switches
-from plots.text import (Block, Heading, Items, Paragraph, Picture, Table, interval, moments, number,
-                        p_clause, p_value, ranges, to_html, to_markdown)
+from plots.style import RESULTS, Drawing, inline_svg, save
+from plots.tables import COUNTERS
+from plots.text import (Block, Coverage, Details, Heading, Items, Lights, Paragraph, Picture,
+                        Screen, Table, interval, moments, number, p_clause, p_value, ranges, slug,
+                        to_html, to_markdown)
 
-TITLE = "Option2Vec: what the reproduction found"
-SOURCES = FIDELITIES + ("authors",)
-ALL_TASKS = TASKS + tuple(PAIRS)
+TITLE = "Option2Vec: does the paper replicate?"
+FIGURES = "figures"  # folder beside the report
+FEW = 3  # parts that are told in a line
 SINGLE_NOTE = (
     "The authors' scripts pick PPO's logs by a name that PPOC's match, too, so that the curve of "
     "PPO in their figures may be the mean of both; here the two are apart. Their logs have no "
     "DAC-OneStep, and IOPG on four tasks.")
 ORIGINAL_NOTE = (
     "Option2Vec as the authors' code computes it, run on this project's tasks "
-    "(`results/reference/README.md` says which version), beside our `released` and their logs: what "
-    "it shares with ours and not with their logs speaks against an error of ours. Return at one "
-    "million steps, and mean return on the way there, which depends less on where a run happens to "
-    "end. The deviation of the latter in their logs is an upper bound.")
+    "(`results/reference/README.md` says which version), beside our `released` and their logs: "
+    "what it shares with ours and not with their logs speaks against an error of ours. Return at "
+    "one million steps, and mean return on the way there, which depends less on where a run "
+    "happens to end. The deviation of the latter in their logs is an upper bound.")
 TRANSFER_NOTE = (
     "OC is the option-critic with four workers; the curve of that name in the authors' figure is "
     "IOPG's. The authors' Option2Vec has embeddings of 20 or 30 dimensions on these pairs. Values "
     "are those at the end of the second task.")
 
 
-def build(results: Path, experiments: Sequence[str] | None = None
-          ) -> tuple[list[Block], list[Drawing]]:
-    """The report's blocks, and the figures among them."""
-    cells = load_cells(results, experiments)
-    sources = {f: our_samples(cells, f) for f in FIDELITIES}
-    sources["authors"] = author_samples(results / "reference")
-    params, gradcheck, theory = (read_rows(results, n) for n in ("params", "gradcheck", "theory"))
-    effects = {path: found.effects
-               for path, found in read_interpretations(results, experiments).items()}
-    evidence = [Evidence(f, sources[f], parameter_counts(params, f), gradcheck, theory,
-                         {p: e for p, e in effects.items() if p.parts[-4] == f})
-                for f in FIDELITIES]
-    evidence.append(Evidence("authors", sources["authors"], AUTHORS_PARAMETERS))
 
+def build(inputs: Inputs) -> tuple[list[Block], list[Drawing], dict]:
+    """The report's blocks, the figures among them, and what claims.json says."""
+    cells, sources = inputs.cells, inputs.sources
+    judged, answers = ledger.judge(inputs), beyond.by_question(inputs)
+    found = ledger.claims_json(judged, inputs, answers)
     drawings: list[Drawing] = []
 
     def drawn(module) -> list[Block]:
-        new = module.draw(results, experiments)
+        new = module.draw(inputs)
         drawings.extend(d for d in new if d.figure is not None)
         return [_picture(d) for d in new]
 
-    return [
-        *_introduction(cells),
-        Heading("Claims"), *_claims(evidence),
-        Heading("Single tasks"), Paragraph(SINGLE_NOTE), *_comparison(TASKS, sources, cells),
-        *drawn(fig_learning_curves),
-        *_original(original_code(results / "reference"), sources),
-        Heading("Transfer"), Paragraph(TRANSFER_NOTE), *_comparison(tuple(PAIRS), sources, cells),
-        *drawn(fig_transfer),
-        Heading("Options"), *drawn(fig_options), *drawn(fig_embedding),
-        Heading("Parameters"), *_parameters(params), *drawn(fig_parameters),
-        Heading("Cost"), *_cost(read_bench(results)), *drawn(fig_cost),
-        Heading("Gradients and physics"), *_checks(gradcheck, read_rows(results, "parity")),
-        Heading("Theory"), *_theory(theory),
-        Heading("Deviations"), *_deviations(read_switches(results), cells, sources["authors"]),
-        Heading("Missing runs"), *_missing(cells),
-    ], drawings
+    options, embedding = drawn(fig_options), drawn(fig_embedding)
+    blocks = [
+        Paragraph(ledger.sentence(judged), lead=True),
+        _first_screen(judged, answers, cells),
+        Heading("All tasks at a glance", short="Glance"), *drawn(fig_aggregate),
+        Details("What the words mean: `paper`, `released`, return, ±, n, p", _definitions(cells)),
+        Heading("Claims of the paper", short="Claims"), *_claims(judged),
+        Heading("Beyond the paper", short="Beyond"), *_beyond(inputs, answers),
+        *drawn(fig_options_count),
+        Heading("Single tasks"), *drawn(fig_learning_curves),
+        *_comparison("Single tasks", TASKS, sources, cells),
+        Details("About the authors' logs of the single tasks", [Paragraph(SINGLE_NOTE)]),
+        *_original(original_code(inputs.results / "reference"), sources),
+        Heading("Transfer"), *drawn(fig_transfer),
+        *_comparison("Transfer", tuple(PAIRS), sources, cells),
+        Details("About the authors' logs of the pairs", [Paragraph(TRANSFER_NOTE)]),
+        Heading("Options"), *options[:1],
+        Details("Figure 7 of the pairs, and of `released`", options[1:]), *embedding[:1],
+        Details("Figure 6 of all runs that were examined", embedding[1:]),
+        Heading("Parameters"), *drawn(fig_parameters),
+        Details("Table of parameters", _parameters(inputs.params)),
+        Heading("Cost"), *drawn(fig_cost), Details("Table of costs", _cost(inputs.bench)),
+        Heading("Checks of our own", short="Checks"),
+        *_own_checks(ledger.judge(inputs, CHECKS)),
+        Details("Gradients and physics by group", _checks(inputs.gradcheck, inputs.parity)),
+        Heading("Theory"), Details("Every statement and reading", _theory(inputs.theory)),
+        Heading("Deviations"),
+        Details("Every switch between the paper and the released code",
+                _deviations(inputs.switches, cells, sources["authors"])),
+        Heading("Missing runs", short="Missing"),
+        Details("What is missing of the grid", _missing(cells)),
+    ]
+    return blocks, drawings, found
 
 
 def _picture(drawing: Drawing) -> Block:
@@ -87,12 +99,46 @@ def _picture(drawing: Drawing) -> Block:
     return Picture(drawing.name, drawing.caption, inline_svg(drawing))
 
 
-def _introduction(cells: Mapping[Key, Cell]) -> list[Block]:
+# ---- The first screen
+
+
+def _first_screen(judged: Sequence[Judged], answers: Sequence, cells: Mapping[Key, Cell]) -> Block:
+    lights = Lights(
+        ["claim of the paper", *(NAMES[s] for s in ledger.SOURCES)],
+        [(j.claim.text, j.claim.place, j.anchor,
+          [(j.word(s), j.count(s)) for s in ledger.SOURCES]) for j in judged])
+    own = Lights(
+        ["our own questions", "`released`", "`paper`"],
+        [(q.text, "", slug(q.text),
+          [(a.word, a.small) for a in (q.answer(parts[s]) for s in ledger.SOURCES[1:])])
+         for q, parts in answers])
+    return Screen(
+        [lights, Paragraph("Words in quotation marks are the paper's. 4/6: by mean alone, whatever "
+                           "the spread, it is so on 4 of 6 tasks. Each verdict leads to its "
+                           "evidence.")],
+        [own, _coverage(cells)])
+
+
+def _coverage(cells: Mapping[Key, Cell]) -> Block:
+    def count(fidelity: str, task: str, method: str) -> int:
+        cell = cells.get(Key(fidelity, "", task, method))
+        return sum(run.seed in SEEDS for run in cell.runs) if cell else 0
+
+    def name(task: str) -> str:
+        return f"pair {task}" if task in PAIRS else task.removesuffix("-v2")
+
+    found, order = ledger.done(cells), ledger.SOURCES[1:]
+    return Coverage(
+        f"**{found} of {GRID} runs are done ({100 * found / GRID:.0f} %).** "
+        f"Seeds, of {len(SEEDS)}:",
+        found / GRID, [NAMES[f] for f in order], [METHODS[m] for m in GRID_METHODS],
+        [(name(task), [[count(f, task, m) for m in GRID_METHODS] for f in order])
+         for task in ALL_TASKS], len(SEEDS))
+
+
+def _definitions(cells: Mapping[Key, Cell]) -> list[Block]:
     runs = [run for key, cell in cells.items() if not key.variant and key not in joined
             for run in cell.runs]
-    grid = len(FIDELITIES) * len(ALL_TASKS) * len(GRID_METHODS) * len(SEEDS)
-    found = sum(run.seed in SEEDS for run in runs)
-    partial = "the whole grid" if found == grid else "a partial grid: see Missing runs"
     folders = ", ".join(f"`{name}`" for name in sorted({run.path.parts[-5] for run in runs}))
     revisions = [f"{_name(key)}: revision {cell.runs[0].revision} is used, {cell.older} runs of "
                  "older revisions are left out" for key, cell in cells.items() if cell.older]
@@ -102,22 +148,20 @@ def _introduction(cells: Mapping[Key, Cell]) -> list[Block]:
     revisions += [f"{_name(key)}: revision {cell.runs[0].revision} is used, there is none of "
                   f"revision {newest[key.algorithm]}" for key, cell in cells.items()
                   if cell.runs[0].revision < newest[key.algorithm]]
-    blocks: list[Block] = [
-        Paragraph(f"Made from the records of {found} of the grid's {grid} runs ({partial}; folders "
-                  f"of `results/`: {folders or 'none'}), and from the authors' learning curves in "
-                  "`results/reference/`. `paper` is a method as it is written, `released` as the "
-                  "authors' code computes it; the authors' curves belong beside `released`."),
-        Paragraph("A return is the mean of the last 20 training episodes at one million steps, on "
-                  "transfer pairs at two. ± is the standard deviation over seeds with divisor n, "
-                  "as in the authors' tables, and n is in parentheses (n of Option2Vec and of the "
-                  "method where two are compared). A run that diverged has no "
-                  "return; it is counted in the remarks. IQM is the mean of the "
-                  "middle half of the seeds. Brackets are 95 % intervals: of differences by "
-                  "Welch's t, of IQM and of the probability of improvement by a bootstrap of 2000 "
-                  "resamples, stratified by task and method, with a fixed stream. p is Welch's, "
-                  "two-sided, not corrected for the number of tests. Figures are drawn by "
-                  "`make report` and `make plots`."),
-    ]
+    blocks: list[Block] = [Items([
+        "`paper` is a method as it is written, `released` as the authors' code computes it. The "
+        "authors' logs were made with their code and belong beside `released`.",
+        f"This page is made from the records of {ledger.done(cells)} of the grid's {GRID} runs "
+        f"(folders of `results/`: {folders or 'none'}), and from the authors' learning curves in "
+        "`results/reference/`. `make report` makes it again.",
+        "A return is the mean of the last 20 training episodes at one million steps, on transfer "
+        "pairs at two. A run that diverged has no return; it is counted in the remarks.",
+        "± is the standard deviation over seeds with divisor n, as in the authors' tables. n is in "
+        "parentheses: of Option2Vec and of the method where two are compared.",
+        "IQM is the mean of the middle half of the seeds. Brackets are 95 % intervals: of "
+        "differences by Welch's t, of IQM and of the probability of improvement by a bootstrap of "
+        "2000 resamples, stratified by task and method, with a fixed stream.",
+        "p is Welch's, two-sided, not corrected for the number of tests."])]
     if revisions:
         blocks += [Paragraph("**Records of several revisions of a method's code:**"),
                    Items(revisions)]
@@ -127,90 +171,119 @@ def _introduction(cells: Mapping[Key, Cell]) -> list[Block]:
 # ---- Claims
 
 
-def _claims(evidence: Sequence[Evidence]) -> list[Block]:
-    judged = [(claim, [claim.judge(e) for e in evidence]) for claim in CLAIMS]
-    tests = sum(bool(f.n) for _, columns in judged for findings in columns for f in findings)
-    blocks: list[Block] = [
-        Paragraph("Definitions, fixed in `plots/claims.py` before the verdicts. The verdict on a "
-                  f"claim, and on each of its parts, is \"{HOLDS}\", \"{FAILS}\", \"{UNDECIDED}\" "
-                  f"at so many seeds, or \"{UNMEASURED}\". A claim about several tasks holds when "
-                  "it holds on as many as it names; it does not hold when that has become "
-                  "impossible. Rivals are DAC+PPO, AHP+PPO, PPOC, OC and PPO, which have to be "
-                  "there for a verdict \"holds\" or a comparison with the best of them, and "
-                  "DAC-OneStep and IOPG where they have runs. Shortened runs decide nothing."),
-        Items([f"**{_title(claim)}**: {claim.definition}" for claim in CLAIMS]),
-        Paragraph(f"Multiplicity: {tests} parts are tests, each at 5 % and uncorrected. \"Holds\" "
-                  "needs every one of several tests, which makes it harder than 5 %; \"does not "
-                  "hold\" needs one shortfall among them, so that some would appear by chance "
-                  "where methods are equal, though rarely where the claim is true. The authors' "
-                  "Option2Vec runs share initial weights and environment seeds on all single tasks "
-                  "but HalfCheetah and Swimmer: their p are too small."),
-        Table(["claim", *(_source(e.source) for e in evidence)],
-              [[_title(claim),
-                *(_summary(verdict_of(claim, findings), findings) for findings in columns)]
-               for claim, columns in judged]),
-    ]
-    for claim, columns in judged:
-        if max(map(len, columns)) == 1:
-            continue  # all of it is in the ledger
-        parts: dict[str, list[str]] = {}
-        for place, findings in enumerate(columns):
-            for finding in findings:
-                parts.setdefault(finding.part, ["-"] * len(columns))[place] = _finding(finding)
-        blocks += [Heading(_title(claim), 3),
-                   Table(["part", *(_source(e.source) for e in evidence)],
-                         [[part, *texts] for part, texts in parts.items()])]
+def _claims(judged: Sequence[Judged]) -> list[Block]:
+    tests = sum(bool(f.n) for j in judged for findings in j.findings.values() for f in findings)
+    blocks: list[Block] = [Details("How a claim is judged", [Paragraph(
+        "Definitions are fixed in `plots/claims.py` before the verdicts. The verdict on a claim, "
+        f"and on each of its parts, is \"{HOLDS}\", \"{FAILS}\", \"{UNDECIDED}\" at so many seeds, "
+        f"or \"{UNMEASURED}\". A claim about several tasks holds when it holds on as many as it "
+        "names; it does not hold when that has become impossible. Rivals are DAC+PPO, AHP+PPO, "
+        "PPOC, OC and PPO, which have to be there for a verdict \"holds\" or a comparison with the "
+        "best of them, and DAC-OneStep and IOPG where they have runs. Shortened runs decide "
+        "nothing. Only the paper's main text was available. Its words are in quotation marks where "
+        "we have them; the rest sums them up. The letters of Figure 4 follow the order of the "
+        "questions."),
+        Paragraph(
+        f"Multiplicity: {tests} parts are tests, each at 5 % and uncorrected. \"Holds\" "
+        "needs every one of several tests, which makes it harder than 5 %; \"does not "
+        "hold\" needs one shortfall among them, so that some would appear by chance "
+        "where methods are equal, though rarely where the claim is true. The authors' "
+        "Option2Vec runs share initial weights and environment seeds on all single tasks "
+        "but HalfCheetah and Swimmer: their p are too small.")])]
+    for j in judged:
+        blocks += [Heading(j.heading, 3),
+                   Items([f"{NAMES[s]}: {_summary(j, s)}" for s in ledger.SOURCES]),
+                   Details("Definition, parts", [Paragraph(j.claim.definition), *_parts(j)])]
     return blocks
 
 
-def _title(claim: Claim) -> str:
-    return f"{claim.question}: {claim.text}" if claim.question else claim.text
+def _parts(j: Judged) -> list[Block]:
+    if max(map(len, j.findings.values())) == 1:
+        return []  # all of it is in the summary
+    parts: dict[str, list[str]] = {}
+    for place, source in enumerate(ledger.SOURCES):
+        for finding in j.findings[source]:
+            parts.setdefault(finding.part, ["-"] * len(ledger.SOURCES))[place] = _finding(finding)
+    return [Table(["part", *(NAMES[s] for s in ledger.SOURCES)],
+                  [[part, *texts] for part, texts in parts.items()])]
 
 
-def _source(source: str) -> str:
-    return "authors' logs" if source == "authors" else f"`{source}`"
-
-
-def _summary(verdict: str, findings: Sequence[Finding]) -> str:
-    seeds = [n for f in findings for n in f.n]
-    at = f" at n = {'-'.join(map(str, sorted({min(seeds), max(seeds)})))}" if seeds else ""
+def _summary(j: Judged, source: str) -> str:
+    """The literal verdict and the statistical one, and the parts that fail, if they are few."""
+    findings, verdict = j.findings[source], j.verdict(source)
+    seeds = j.seeds(source)
+    at = f" at n = {'-'.join(map(str, sorted(set(seeds))))}" if seeds else ""
     reasons = list(dict.fromkeys(f.measured for f in findings))
     if len(reasons) == 1 or verdict == UNMEASURED:
-        return f"{verdict}{at}: {'; '.join(reasons)}"
+        return f"**{verdict}**{at}: {'; '.join(reasons)}"
     counts = {text: sum(f.verdict == v for f in findings) for v, text in (
         (HOLDS, "holds on"), (FAILS, "does not hold on"), (UNDECIDED, "undecided on"),
         (UNMEASURED, "not measured on"))}
-    text = f"{verdict}{at}: " + ", ".join(f"{text} {n}" for text, n in counts.items() if n)
-    leads = [f.leads for f in findings if f.leads is not None]
-    return text + (f"; highest mean on {sum(leads)} of {len(leads)}" if leads else "")
+    literal = j.literally(source)
+    failed = [f"{f.part} {f.measured}" for f in findings if f.verdict == FAILS]
+    return ((f"{literal}; " if literal else "") + f"**{verdict}**{at}: "
+            + ", ".join(f"{text} {n}" for text, n in counts.items() if n)
+            + (f" ({'; '.join(failed)})" if 0 < len(failed) <= FEW else ""))
 
 
 def _finding(finding: Finding) -> str:
     seeds = f" (n = {', '.join(map(str, finding.n))})" if finding.n else ""
-    lead = {True: "highest mean, ", False: "not the highest mean, ", None: ""}[finding.leads]
-    return f"{finding.verdict}: {lead}{finding.measured}{seeds}"
+    return f"{finding.verdict}: {finding.measured}{seeds}"
+
+
+def _own_checks(judged: Sequence[Judged]) -> list[Block]:
+    return [Items([f"{j.claim.text}, {NAMES[s]}: {_summary(j, s)}. {j.claim.definition}"
+                   for j in judged for s in FIDELITIES])]
+
+
+# ---- Beyond the paper
+
+
+def _beyond(inputs: Inputs, answers: Sequence[tuple[beyond.Question, Mapping]]) -> list[Block]:
+    blocks: list[Block] = [Paragraph(
+        "Our own questions, with the same statistics. A table fills as its runs arrive in "
+        "`results/ablation`; what is missing says so.")]
+    for question, parts in answers:
+        lines = []
+        for fidelity in ledger.SOURCES[1:]:
+            answer = question.answer(parts[fidelity])
+            lines.append(f"{NAMES[fidelity]}: **{answer.word}**: {answer.reason}")
+        names = list(dict.fromkeys(p.name for found in parts.values() for p in found))
+        table = [[name, *(next((p.measured for p in parts[f] if p.name == name), "-")
+                          for f in ledger.SOURCES[1:])] for name in names]
+        measured = [Table(["on", "`released`", "`paper`"], table)] if table else []
+        blocks += [Heading(question.text, 3), Items(lines),
+                   Details("Definition, parts", [Paragraph(question.definition), *measured])]
+    rows = beyond.one_factor_rows(inputs)
+    blocks.append(Details("From PPO to one option, one factor at a time", [
+        Table(["task", "fidelity", "method", "changed", "return", "at step"], rows) if rows
+        else Paragraph("Not measured yet: no runs of PPO, or of Option2Vec with one option, with a "
+                       "further factor changed.")]))
+    return blocks
 
 
 # ---- Returns
 
 
-def _comparison(tasks: Sequence[str], sources: Mapping[str, Samples],
+def _comparison(title: str, tasks: Sequence[str], sources: Mapping[str, Samples],
                 cells: Mapping[Key, Cell]) -> list[Block]:
     blocks: list[Block] = []
-    for source in SOURCES:
+    for source in ledger.SOURCES:
         samples = sources[source]
         rows = [[task, *(_entry(samples.get((task, m)), cells.get(Key(source, "", task, m)))
                          for m in METHODS)] for task in tasks]
-        blocks += [Heading(f"Returns, {_source(source)}", 3),
-                   Table(["task", *METHODS.values()], rows)]
-    blocks += [Heading("Probability of improvement of Option2Vec, mean over tasks", 3),
-               Table(["over", *map(_source, SOURCES)],
-                     [[METHODS[m], *(_mean_improvement(tasks, m, sources[s]) for s in SOURCES)]
-                      for m in METHODS if m != OURS])]
-    for fidelity in FIDELITIES:
+        table = Table(["task", *METHODS.values()], rows)
+        blocks += [Heading(f"{title}: returns, {NAMES[source]}", 3),
+                   table if source == "released" else Details("Table", [table])]
+    blocks += [Heading(f"{title}: probability of improvement", 3),
+               Paragraph("Chance that a run of Option2Vec beats one of the method, over tasks."),
+               Details("Table", [Table(["over", *(NAMES[s] for s in ledger.SOURCES)], [
+                   [METHODS[m], *(_mean_improvement(tasks, m, sources[s]) for s in ledger.SOURCES)]
+                   for m in METHODS if m != OURS])])]
+    for fidelity in ("released", "paper"):
         rows = [_row(task, m, sources[fidelity], sources["authors"])
                 for task in tasks for m in METHODS if (task, m) in sources[fidelity]]
-        blocks.append(Heading(f"Ours in detail, {_source(fidelity)}", 3))
+        blocks.append(Heading(f"{title}: ours in detail, {NAMES[fidelity]}", 3))
         if not rows:
             blocks.append(Paragraph("No runs yet."))
             continue
@@ -220,7 +293,7 @@ def _comparison(tasks: Sequence[str], sources: Mapping[str, Samples],
                   "P(Option2Vec > method) [95 %]", "Option2Vec - method [95 %]", "p", "remarks"]
         if tasks[0] in PAIRS:
             header += ["first task, ours", "first task, authors"]
-        blocks.append(Table(header, rows))
+        blocks.append(Details("Table", [Table(header, rows)]))
     return blocks
 
 
@@ -235,7 +308,8 @@ def _agreement(tasks: Sequence[str], ours: Samples, authors: Samples) -> list[Bl
             end = welch(sample.moments, published.moments).p
             if task in PAIRS:
                 first = welch(Moments.of(sample.first), Moments.of(published.first)).p
-                p |= {f"{name} on {task}'s first task": first, f"{name} on {task}'s second task": end}
+                p |= {f"{name} on {task}'s first task": first,
+                      f"{name} on {task}'s second task": end}
             else:
                 p[f"{name} on {task}"] = end
     p = {what: value for what, value in p.items() if not math.isnan(value)}
@@ -248,7 +322,7 @@ def _agreement(tasks: Sequence[str], ours: Samples, authors: Samples) -> list[Bl
         f"Ours against the authors', Welch's test: of {len(p)} comparisons {below or 'none'} "
         f"{'has' if below < 2 else 'have'} p < {level:.2f}; were there no difference at all, "
         f"{number(level * len(p))} would be expected. With Holm's correction for their number "
-        f"{len(left) or 'none'} {'is' if len(left) < 2 else 'are'} left"
+        f"{len(left) or 'none'} {'remains' if len(left) < 2 else 'remain'}"
         f"{': ' if left else ''}{', '.join(left)}.")]
 
 
@@ -262,9 +336,10 @@ def _original(runs: Mapping[str, tuple[Moments, Moments]],
         ours, logs = (sources[s].get((task, OURS)) for s in ("released", "authors"))
         rows.append([task, moments(_moments(ours)), moments(final), moments(_moments(logs)),
                      moments(ours and ours.area), moments(area), moments(logs and logs.area)])
-    return [Heading("The authors' code on our simulator", 3), Paragraph(ORIGINAL_NOTE),
-            Table(["task", "ours, `released`", "their code here", "their logs",
-                   "mean over all steps, ours", "their code here", "their logs"], rows)]
+    return [Heading("The authors' code on our simulator", 3),
+            Details("Note and table", [Paragraph(ORIGINAL_NOTE), Table([
+                "task", "ours, `released`", "their code here", "their logs",
+                   "mean over all steps, ours", "their code here", "their logs"], rows)])]
 
 
 def _entry(sample: Sample | None, cell: Cell | None) -> str:
@@ -417,8 +492,8 @@ def _deviations(switches: Rows, cells: Mapping[Key, Cell], authors: Samples) -> 
                      "; ".join(others) or "-",
                      *(_ran(s["switch"], f, cells) for f in FIDELITIES),
                      "; ".join(_effects(s["switch"], cells)) or "not measured"])
-    return [Paragraph("Every difference between the paper and the released code in what is computed "
-                      "is a switch; differences in sizes are in the second table. Runs: "
+    return [Paragraph("Every difference between the paper and the released code in what is "
+                      "computed is a switch; differences in sizes are in the second table. Runs: "
                       "the values in the records, with their number. Effect: return with the "
                       "switch turned less that of the same seed without, other switches as the "
                       "fidelity has them (Student's t of the pairs)."),
@@ -521,7 +596,7 @@ def _paired(gains: Sequence[float]) -> str:
 def _missing(cells: Mapping[Key, Cell]) -> list[Block]:
     rows = [[task, *(_missing_seeds(task, f, cells) for f in FIDELITIES)] for task in ALL_TASKS]
     return [Paragraph(f"Of the whole grid: every method, seeds {ranges(SEEDS)}."),
-            Table(["task", *map(_source, FIDELITIES)], rows)]
+            Table(["task", *(NAMES[f] for f in FIDELITIES)], rows)]
 
 
 def _missing_seeds(task: str, fidelity: str, cells: Mapping[Key, Cell]) -> str:
@@ -544,27 +619,30 @@ def main() -> None:
     parser.add_argument("--results", type=Path, default=RESULTS)
     parser.add_argument("--experiment", action="append",
                         help="folder of results/ (again for more; default: all but quick and ci)")
-    parser.add_argument("--out", type=Path, help="folder of the report and, then, of its figures "
-                        "(default: --results, and plots/ for the figures)")
+    parser.add_argument("--out", type=Path, help="folder of the report (default: --results)")
     parser.add_argument("--mine", type=Path, action="append", default=[],
                         help="runs of one's own: a folder of them, or a table (again for more)")
     options = parser.parse_args()
+    inputs = Inputs(options.results, options.experiment)
     try:
         for message in mine.join(options.mine):
             print(f"report: left out: {message}", file=sys.stderr)
-        blocks, drawings = build(options.results, options.experiment)
+        blocks, drawings, found = build(inputs)
     except (DamagedFile, FileNotFoundError) as error:
         sys.exit(f"report: {error}")
     folder = options.out or options.results
-    figures = options.out or FOLDER
     folder.mkdir(parents=True, exist_ok=True)
     for drawing in drawings:
-        save(drawing, figures)
-    link = Path(os.path.relpath(figures, folder)).as_posix()
-    for name, text in (("REPORT.md", to_markdown(TITLE, blocks, link)),
-                       ("report.html", to_html(TITLE, blocks))):
+        save(drawing, folder / FIGURES, png=False)
+    for name, text in (("REPORT.md", to_markdown(TITLE, blocks, FIGURES)),
+                       ("report.html", to_html(TITLE, blocks)),
+                       ("claims.json", ledger.to_text(found))):
         (folder / name).write_text(text, encoding="utf-8")
         print(folder / name)
+    if folder == RESULTS:
+        readme = RESULTS.parent / "README.md"
+        readme.write_text(ledger.put_box(readme.read_text(encoding="utf-8"), ledger.box(found)),
+                          encoding="utf-8")
 
 
 if __name__ == "__main__":

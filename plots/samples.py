@@ -1,7 +1,8 @@
 """What is known of a method on a task, in one form for our records and the authors' logs."""
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,10 @@ class Sample:
     durations: np.ndarray  # (2, runs) [steps] mean duration of an option, first and last tenth
     diverged: int = 0
     older: int = 0  # runs of older revisions, left out
+    # Of each run: standard deviation of the return's change from a grid step to the next in the
+    # second half of the steps, and persistence (of a run with options).
+    jumps: np.ndarray = field(default_factory=lambda: np.empty(0))
+    persistence: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     @property
     def moments(self) -> Moments:
@@ -81,6 +86,19 @@ def mean_duration(run: Run) -> np.ndarray:
     return np.divide(usage.sum(axis=1), total, out=np.full(len(total), np.nan), where=total > 0)
 
 
+def persistence(run: Run) -> float:
+    """Mean duration of an option over the one of independent draws with the same shares, where an
+    option lasts 1 / (1 - sum of u_k^2) steps in the mean; both pooled over the last tenth of the
+    steps. NaN where nothing is known, as of one option alone."""
+    late = run.step > (1 - TENTH) * run.wanted
+    mean, u = mean_duration(run)[late], np.nan_to_num(run.usage[late])
+    alike = (u**2).sum(axis=1)  # chance that two independent draws are the same
+    known = ~np.isnan(mean) & (alike < 1 - 1e-9)
+    if not known.any():
+        return math.nan
+    return float(_pooled(mean[known]) / _pooled(1 / (1 - alike[known])))
+
+
 def _of_runs(task: str, cell: Cell) -> Sample:
     horizon = horizon_of(task)
     step = min(cell.wanted, horizon)
@@ -98,7 +116,9 @@ def _of_runs(task: str, cell: Cell) -> Sample:
         Curve(grid, returns.mean(axis=0), returns.std(axis=0), len(returns)),
         Moments.of(returns.mean(axis=1)), Moments.of(gains),
         float(returns[:, late].mean() - returns[:, 0].mean()),
-        _durations(cell.whole), cell.diverged, cell.older)
+        _durations(cell.whole), cell.diverged, cell.older,
+        np.diff(returns[:, grid > grid[-1] / 2]).std(axis=1) if len(grid) > 4 else np.empty(0),
+        np.array([x for x in map(persistence, cell.whole) if not math.isnan(x)]))
 
 
 def _window(grid: np.ndarray, begin: float, end: float) -> np.ndarray:

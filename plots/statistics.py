@@ -121,6 +121,54 @@ def mean_improvement(*samples: np.ndarray, axis: int = -1) -> np.ndarray:
     return np.mean([improvement(x, y, axis) for x, y in zip(samples[::2], samples[1::2])], axis=0)
 
 
+@dataclass(frozen=True)
+class Scores:
+    """Runs of one method on several tasks, each less the mean of its rival and over the size of it:
+    Agarwal et al. 2021, "Deep Reinforcement Learning at the Edge of the Statistical Precipice".
+    Resamples draw runs with replacement, each task's and each method's by themselves."""
+    runs: tuple[np.ndarray, ...]  # of each task, (n)
+    resampled: tuple[np.ndarray, ...]  # of each task, (RESAMPLES, n)
+
+    @staticmethod
+    def of(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> "Scores":
+        """pairs: by task the returns of the method and of its rival."""
+        rng = np.random.default_rng(STREAM)
+
+        def again(x: np.ndarray) -> np.ndarray:
+            return x[rng.integers(len(x), size=(RESAMPLES, len(x)))]
+
+        def score(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+            mean = y.mean(axis=-1, keepdims=True)
+            return (x - mean) / np.abs(mean)
+
+        return Scores(tuple(score(x, y) for x, y in pairs),
+                      tuple(score(again(x), again(y)) for x, y in pairs))
+
+    @staticmethod
+    def _interval(resampled: np.ndarray) -> np.ndarray:
+        tail = 50 * (1 - CONFIDENCE)
+        return np.percentile(resampled, [tail, 100 - tail], axis=0)
+
+    def means(self) -> list[tuple[float, Interval]]:
+        """By task; the interval is NaN for a single run."""
+        return [(float(x.mean()), tuple(self._interval(again.mean(axis=1))) if len(x) > 1
+                 else UNKNOWN) for x, again in zip(self.runs, self.resampled)]
+
+    def iqm(self) -> tuple[float, Interval]:
+        """Interquartile mean of all runs of all tasks."""
+        low, high = self._interval(iqm(np.concatenate(self.resampled, axis=1)))
+        return float(iqm(np.concatenate(self.runs))), (float(low), float(high))
+
+    def profile(self, thresholds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Share of the runs above each threshold, tasks counting alike, and its pointwise interval
+        (2, thresholds)."""
+        def share(x: np.ndarray) -> np.ndarray:
+            return (x[..., None] > thresholds).mean(axis=-2)
+
+        return (np.mean([share(x) for x in self.runs], axis=0),
+                self._interval(np.mean([share(x) for x in self.resampled], axis=0)))
+
+
 def seeds_needed(x: Moments, y: Moments, largest: int = 1000) -> int | None:
     """Seeds a method at which Welch's test would find this difference with 80 % power, were means
     and deviations the true ones. None for more than `largest` or where they are not known."""

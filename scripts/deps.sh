@@ -1,5 +1,5 @@
 #!/bin/sh
-# Installs those Debian packages of this list that are missing.
+# Installs the Debian packages of this list that are missing, or of those that are named.
 set -eu
 
 # The CMake file of libmujoco-dev needs libgl-dev and libopengl-dev, but its package does not name them.
@@ -10,6 +10,7 @@ packages="
   python3 python3-pip python3-numpy python3-scipy python3-matplotlib
   clang-format clang-tidy
 "
+[ $# = 0 ] || packages=$*
 
 # FILM=1: what draws and codes films.
 [ "${FILM:-0}" = 1 ] && packages="$packages libosmesa6 ffmpeg"

@@ -1,10 +1,12 @@
 import unittest
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from plots.claims import (AUTHORS_PARAMETERS, CLAIMS, FAILS, HOLDS, OURS, RIVALS, UNDECIDED,
-                          UNMEASURED, Evidence, Finding, primary_share, verdict_of)
+from plots.claims import (APART, AS_PRINTED, AUTHORS_PARAMETERS, CHECKS, CLAIMS, FAILS, HOLDS, OURS,
+                          RIVALS, UNDECIDED, UNMEASURED, Evidence, Finding, primary_share,
+                          verdict_of)
 from plots.records import FINITE, INFINITE, PAIRS, TASKS
 from plots.samples import Curve, Sample, author_samples, horizon_of
 from plots.statistics import Moments
@@ -21,8 +23,8 @@ def sample(finals, task="HalfCheetah-v2", step=None, areas=None, gains=(0, 0), p
                   np.array(durations, dtype=float))
 
 
-def judged(text: str, evidence: Evidence) -> tuple[str, dict[str, Finding]]:
-    claim, = (c for c in CLAIMS if c.text.startswith(text))
+def judged(id: str, evidence: Evidence) -> tuple[str, dict[str, Finding]]:
+    claim, = (c for c in CLAIMS + CHECKS if c.id == id)
     findings = claim.judge(evidence)
     return verdict_of(claim, findings), {f.part: f for f in findings}
 
@@ -35,7 +37,7 @@ def versus(tasks, ours, rivals) -> Evidence:
 
 
 class AboveTest(unittest.TestCase):
-    TEXT = "Option2Vec is above DAC-OneStep"
+    TEXT = "q1"
 
     def verdicts(self, onestep):
         return judged(self.TEXT, versus(TASKS, [10, 11, 12], {"dac_onestep": onestep}))
@@ -78,7 +80,7 @@ class AboveTest(unittest.TestCase):
 
 
 class FirstTest(unittest.TestCase):
-    TEXT = "Best on the four"
+    TEXT = "q2-best"
 
     def test_needs_to_be_above_every_rival(self):
         # PPO's mean is lower than DAC+PPO's, but so spread out that it is not told apart.
@@ -89,7 +91,7 @@ class FirstTest(unittest.TestCase):
         verdict, parts = judged(self.TEXT, versus(INFINITE, [10, 11, 12], rivals))
         self.assertEqual(verdict, UNDECIDED)
         self.assertIn("against PPO", parts["Swimmer-v2"].measured)
-        self.assertTrue(parts["Swimmer-v2"].leads)
+        self.assertTrue(parts["Swimmer-v2"].literal)
 
     def test_a_better_rival_refutes_it_even_when_others_are_missing(self):
         evidence = Evidence("paper", {("Swimmer-v2", OURS): sample([1, 2, 3]),
@@ -108,14 +110,14 @@ class FirstTest(unittest.TestCase):
             samples = dict(versus(PAIRS, [10, 11, 12], {}).samples)
             for pair in list(PAIRS)[:lost]:
                 samples[pair, "ppo"] = sample([30, 31, 32], pair)
-            verdict, _ = judged("First on five of the six", Evidence("paper", samples))
+            verdict, _ = judged("q3", Evidence("paper", samples))
             self.assertEqual(verdict, expected)
 
     def test_a_lost_pair_alone_does_not_refute_five_of_six(self):
         samples = dict(versus(PAIRS, [10, 11, 12], {}).samples)
         for pair, rival in zip(PAIRS, ([30, 31, 32], [9, 11, 13])):
             samples[pair, "ppo"] = sample(rival, pair)
-        self.assertEqual(judged("First on five", Evidence("paper", samples))[0], UNDECIDED)
+        self.assertEqual(judged("q3", Evidence("paper", samples))[0], UNDECIDED)
 
     def test_a_rival_with_one_seed_cannot_be_beaten(self):
         verdict, parts = judged(self.TEXT, versus(INFINITE, [10, 11, 12], {"oc": [1]}))
@@ -125,7 +127,7 @@ class FirstTest(unittest.TestCase):
     def test_faster_is_about_the_area(self):
         samples = {(t, m): sample([5, 5, 5], t, areas=[2, 2.1, 2.2] if m == OURS else [1, 1.1, 1.2])
                    for t in INFINITE for m in (OURS, *RIVALS)}
-        self.assertEqual(judged("Faster", Evidence("paper", samples))[0], HOLDS)
+        self.assertEqual(judged("q2-faster", Evidence("paper", samples))[0], HOLDS)
         self.assertEqual(judged(self.TEXT, Evidence("paper", samples))[0], UNDECIDED)
 
 
@@ -134,15 +136,15 @@ class AgainstTheBestTest(unittest.TestCase):
         narrow, wide = list(100 + np.arange(10) / 10), list(100 + 20 * np.arange(10))
         for ours, best, expected in ((narrow, wide, HOLDS), (wide, narrow, FAILS),
                                      (narrow, narrow, UNDECIDED)):
-            verdict, _ = judged("Smaller variance", versus(INFINITE, ours, {"ppo": best}))
+            verdict, _ = judged("q2-variance", versus(INFINITE, ours, {"ppo": best}))
             self.assertEqual(verdict, expected)
 
     def test_spread_that_no_test_can_judge_is_undecided(self):
         # All deviations from the medians 2 and 3 are 1: Brown-Forsythe's F is 0 / 0.
         evidence = versus(INFINITE, [1, 1, 3, 3], {"ppo": [2, 2, 4, 4]})
-        self.assertEqual(judged("Smaller variance", evidence)[0], UNDECIDED)
+        self.assertEqual(judged("q2-variance", evidence)[0], UNDECIDED)
         evidence = versus(INFINITE, [1, 1, 3, 3], {"ppo": [1, 1, 5, 5]})  # F is 1 / 0
-        self.assertEqual(judged("Smaller variance", evidence)[0], HOLDS)
+        self.assertEqual(judged("q2-variance", evidence)[0], HOLDS)
 
     def test_comparable_within_a_fifth_of_the_best_rival(self):
         # The best rival's mean is 100, the margin 20.
@@ -152,9 +154,21 @@ class AgainstTheBestTest(unittest.TestCase):
                 ([90, 91, 92], FAILS),       # below, though within the margin
                 ([60, 100, 140], UNDECIDED),  # the interval reaches too far
                 ([150, 151, 152], HOLDS)):
-            verdict, parts = judged("Comparable", versus(FINITE, ours, {"ppo": [99, 100, 101]}))
+            verdict, parts = judged("q2-comparable", versus(FINITE, ours, {"ppo": [99, 100, 101]}))
             self.assertEqual(verdict, expected)
             self.assertIn("margin 20.00", parts["Ant-v2"].measured)
+
+
+    def test_changes_from_step_to_step_are_compared_with_the_best_rival(self):
+        for ours, best, expected in (([1, 1.1, 1.2], [5, 5.1, 5.2], HOLDS),
+                                     ([5, 5.1, 5.2], [1, 1.1, 1.2], FAILS),
+                                     ([1, 1.1, 1.2], [1, 1.1, 1.2], UNDECIDED),
+                                     ([], [], UNMEASURED)):
+            samples = dict(versus(INFINITE, [10, 11, 12], {"ppo": [5, 6, 7]}).samples)
+            for task in INFINITE:
+                for method, jumps in ((OURS, ours), ("ppo", best)):
+                    samples[task, method] = replace(samples[task, method], jumps=np.array(jumps))
+            self.assertEqual(judged("q2-steps", Evidence("paper", samples))[0], expected)
 
 
 class AloneTest(unittest.TestCase):
@@ -163,29 +177,65 @@ class AloneTest(unittest.TestCase):
                                 ([-9, -8, -9, -8], FAILS), ([0, 9, 0, 9], UNDECIDED)):
             evidence = Evidence("paper", {
                 (t, OURS): sample([1], t, gains=gains, progress=100) for t in TASKS})
-            self.assertEqual(judged("Option2Vec has converged", evidence)[0], expected)
+            self.assertEqual(judged("converged", evidence)[0], expected)
 
     def test_durations_grow_by_run(self):
         for late, expected in (([5, 15, 25], HOLDS), ([1, 9, 19], FAILS), ([1, 20, 21], UNDECIDED)):
             # Early 2, 11, 21 of the three runs: paired differences of a few steps.
             evidence = Evidence("paper", {
                 (t, OURS): sample([1], t, durations=([2, 11, 21], late)) for t in TASKS})
-            self.assertEqual(judged("Option durations grow", evidence)[0], expected)
-        self.assertEqual(judged("Option durations", versus(TASKS, [1], {}))[0], UNMEASURED)
+            self.assertEqual(judged("q5", evidence)[0], expected)
+        self.assertEqual(judged("q5", versus(TASKS, [1], {}))[0], UNMEASURED)
 
 
 class OtherTest(unittest.TestCase):
     def test_the_share_of_parameters_depends_on_the_width(self):
         evidence = Evidence("authors", {}, AUTHORS_PARAMETERS)
-        verdicts = [judged(f"15.8 % of the parameters of the option network, at {width}", evidence)
-                    for width in ("DAC's own width 64", "width 128")]
+        verdicts = [judged(f"share-{width}", evidence) for width in (64, 128)]
         self.assertEqual([v for v, _ in verdicts], [FAILS, HOLDS])
         self.assertIn("54.8 %", verdicts[0][1]["S = 17, A = 6"].measured)
+
+    def test_an_option_costs_more_than_its_embedding(self):
+        # K + 1: 40 of W_o, 65 of the initial net, then 2 * 40 + 1 logits and 65 of the critic in
+        # `released`, 40 + 1 logits in `paper`. An action policy of DAC has 5312 + 65 * 6 = 5702 at
+        # width 64, 18816 + 129 * 6 = 19590 at 128.
+        for source, adds in (("paper", 146), ("released", 251), ("authors", 251)):
+            verdict, parts = judged("option-size", Evidence(source, {}))
+            self.assertEqual((verdict, [f.verdict for f in parts.values()]),
+                             (FAILS, [HOLDS, FAILS, FAILS]))
+            self.assertEqual([f.measured for f in parts.values()], [
+                "40 parameters", f"{adds} parameters more from K = 4 to 5",
+                "5702 parameters at DAC's own width 64, 19590 at 128"])
+
+    def test_cost_is_the_time_of_a_step_beside_dac(self):
+        def costs(*pairs):
+            return [{"task": task, "method": method, "fidelity": "paper", "total_us": us}
+                    for task, *both in pairs for method, us in zip((OURS, "dac_ppo"), both)]
+
+        def verdict(*pairs):
+            return judged("cost", Evidence("paper", {}, costs=costs(*pairs)))
+
+        self.assertEqual(verdict(*((t, 90, 100) for t in TASKS))[0], HOLDS)
+        self.assertEqual(verdict(*((t, 95, 100) for t in TASKS))[0], UNDECIDED)
+        self.assertEqual(verdict(("Ant-v2", 101, 100))[0], FAILS)
+        self.assertEqual(verdict(("Ant-v2", 90, 100))[0], UNDECIDED)
+        self.assertEqual(verdict()[0], UNMEASURED)
+        _, parts = verdict(("Ant-v2", 59.7, 45.0))
+        self.assertEqual(parts["Ant-v2"].measured, "59.70 µs a step, DAC+PPO 45.00")
+
+    def test_the_printed_proposition_is_false_once_a_counterexample_is_found(self):
+        for check, expected in (("PASS", FAILS), ("FAIL", UNDECIDED)):
+            rows = [{"name": AS_PRINTED, "verdict": check}]
+            self.assertEqual(judged("proposition", Evidence("paper", {}, theory=rows))[0], expected)
+        self.assertEqual(judged("proposition", Evidence("paper", {}))[0], UNMEASURED)
+        self.assertEqual(judged("proposition", Evidence("authors", {}))[0], APART)
+        with (ROOT / "results" / "theory.csv").open(encoding="utf-8") as file:
+            self.assertEqual(sum(line.startswith(AS_PRINTED + ",") for line in file), 1)
 
     def test_one_wrong_gradient_of_the_fidelity_counts(self):
         rows = [{"name": "ppo all released", "largest_error": 2e-6},
                 {"name": "ppo all paper", "largest_error": 1e-9}]
-        verdicts = [judged("Gradients", Evidence(f, {}, gradcheck=rows))[0]
+        verdicts = [judged("gradients", Evidence(f, {}, gradcheck=rows))[0]
                     for f in ("paper", "released")]
         self.assertEqual(verdicts, [HOLDS, FAILS])
 
@@ -194,42 +244,49 @@ class OtherTest(unittest.TestCase):
             ("Proposition 3.1 stationary", "PASS"), ("Proposition 3.1 for one V: false", "PASS"),
             ("Proposition 3.2", "PASS"), ("Theorem 3.3", "PASS"),
             ("Theorems 3.3 and 3.4 shared", "FAIL"))]
-        verdict, parts = judged("Propositions 3.1", Evidence("paper", {}, theory=rows))
+        verdict, parts = judged("theory", Evidence("paper", {}, theory=rows))
         self.assertEqual([f.verdict for f in parts.values()], [HOLDS, HOLDS, FAILS, FAILS])
         self.assertEqual(verdict, FAILS)
         self.assertIn("2 of 2 checks come out as said; 1 of them",
                       parts["Proposition 3.1"].measured)
-        self.assertEqual(judged("Propositions 3.1", Evidence("paper", {}))[0], UNMEASURED)
+        self.assertEqual(judged("theory", Evidence("paper", {}))[0], UNMEASURED)
 
     def test_embeddings_aligned_with_actions_are_told_from_rotated_ones(self):
         rng = np.random.default_rng(7)
         aligned = np.zeros((12, 3))
         aligned[np.arange(12), np.arange(12) % 3] = rng.normal(size=12) + 3
         self.assertEqual(primary_share(aligned), 1)
-        for effects, expected in ((aligned, HOLDS), (rng.normal(size=(12, 3)), UNDECIDED)):
+        for effects, expected in ((aligned, HOLDS), (rng.normal(size=(12, 3)), UNDECIDED)):  # n = 1
             path = Path("results/interpret/paper/Hopper-v2/option2vec/seed-000.csv")
             evidence = Evidence("paper", {}, effects={path: effects})
-            self.assertEqual(judged("Embeddings", evidence)[0], expected)
+            self.assertEqual(judged("q4", evidence)[0], expected)
             # A task with one action, which is every dimension's primary action, says nothing.
             evidence.effects[Path("pendulum")] = np.ones((12, 1))
-            self.assertEqual(judged("Embeddings", evidence)[0], expected)
+            self.assertEqual(judged("q4", evidence)[0], expected)
             evidence.effects.pop(path)
-            self.assertEqual(judged("Embeddings", evidence)[0], UNMEASURED)
+            self.assertEqual(judged("q4", evidence)[0], UNMEASURED)
+
+    def test_embeddings_that_are_no_better_than_rotated_ones_fail(self):
+        # Twenty runs of pure noise: share less its mean after rotation is 0 within a point or two.
+        rng = np.random.default_rng(11)
+        effects = {Path(f"seed-{i}"): rng.normal(size=(40, 6)) for i in range(20)}
+        verdict, parts = judged("q4", Evidence("paper", {}, effects=effects))
+        self.assertEqual((verdict, parts["embedding"].n), (FAILS, (20,)))
 
     def test_the_authors_logs_say_what_is_known_of_them(self):
         # Welch's p of these comparisons, worked out from the logs on their own: HalfCheetah
         # against PPO 0.031, Swimmer against AHP+PPO 0.017, HumanoidStandup 0.018, Reacher 0.023
         # in favour of PPO; Ant 0.0014 and Humanoid 0.0019 below PPO.
         evidence = Evidence("authors", author_samples(ROOT / "results" / "reference"))
-        verdict, parts = judged("Best on the four", evidence)
+        verdict, parts = judged("q2-best", evidence)
         self.assertEqual(verdict, FAILS)
         for task, p in zip(INFINITE, ("0.031", "0.017", "0.018", "0.023")):
             self.assertIn(f"p = {p}", parts[task].measured)
-        verdict, parts = judged("Comparable", evidence)
+        verdict, parts = judged("q2-comparable", evidence)
         self.assertEqual([t for t, f in parts.items() if f.verdict == FAILS],
                          ["Ant-v2", "Humanoid-v2"])
-        verdict, parts = judged("First on five", evidence)
-        self.assertEqual((verdict, sum(f.leads for f in parts.values())), (UNDECIDED, 4))
+        verdict, parts = judged("q3", evidence)
+        self.assertEqual((verdict, sum(f.literal for f in parts.values())), (UNDECIDED, 4))
 
 
 if __name__ == "__main__":

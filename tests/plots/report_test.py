@@ -1,5 +1,6 @@
 import contextlib
 import io
+import json
 import re
 import sys
 import tempfile
@@ -11,13 +12,14 @@ from unittest import mock
 
 import numpy as np
 
-from plots import fig_cost, fig_embedding, fig_learning_curves, fig_options, report
+from plots import beyond, fig_cost, fig_embedding, fig_learning_curves, fig_options, ledger, report
+from plots.inputs import Inputs
 from plots.records import load_cells
 from plots.samples import Curve, Sample, author_samples, our_samples
 from plots.statistics import Moments
-from plots.style import inline_svg, svg_of
-from plots.text import moments
-from tree import with_reference, write_flat, write_run
+from plots.style import RESULTS, inline_svg, svg_of
+from plots.text import Picture, moments, slug, to_html
+from tree import ROOT, with_reference, write_flat, write_run
 
 COUNTERS = {"physics_us": 80.5, "inference_us": 5, "learning_us": 20, "total_us": 105.5,
             "bound_us": 99, "bound_products_us": 12, "bound_adam_us": 6.5, "MFLOP": 2,
@@ -35,6 +37,15 @@ def make(results: Path) -> dict[str, str]:
         stack.enter_context(mock.patch.object(fig_learning_curves, "draw", return_value=[]))
         report.main()
         return {path.name: path.read_text() for path in sorted(Path(out).iterdir())}
+
+
+def cost_figure(results: Path):
+    (results / "bench.json").write_text(str({"benchmarks": [
+        {"name": f"step/Humanoid-v2/{m}/{f}/iterations:5"} | COUNTERS
+        for m in ("option2vec", "ppo", "oc") for f in ("paper", "released")
+    ]}).replace("'", '"'))
+    drawing, = fig_cost.draw(Inputs(results))
+    return drawing
 
 
 class ReportTest(unittest.TestCase):
@@ -116,8 +127,8 @@ class ReportTest(unittest.TestCase):
     def test_agreement_with_the_authors_counts_both_ends_of_a_pair(self):
         # Ours of Cheetah are 7 and 8, the authors' 290 +- 49 and 73 +- 85 of ten runs: p far below
         # 0.001, and 65.4 / (85 / 3) = 2.31 with 9 degrees of freedom, p = 0.046.
-        self.assertIn("of 2 comparisons 2 have p < 0.05; were there no difference at all, 0.100 would "
-                      "be expected. With Holm's correction for their number 2 are left: PPO on "
+        self.assertIn("of 2 comparisons 2 have p < 0.05; were there no difference at all, 0.100 "
+                      "would be expected. With Holm's correction for their number 2 remain: PPO on "
                       "Cheetah's first task, PPO on Cheetah's second task.", self.files["REPORT.md"])
 
     def test_agreement_holds_p_against_the_number_of_comparisons(self):
@@ -135,7 +146,7 @@ class ReportTest(unittest.TestCase):
         paragraph, = report._agreement([task for task, _ in keys], ours,
                                        {key: sample(0) for key in keys})
         self.assertIn("of 3 comparisons 2 have p < 0.05", paragraph.text)
-        self.assertIn("With Holm's correction for their number 1 is left: PPO on Ant-v2.",
+        self.assertIn("With Holm's correction for their number 1 remains: PPO on Ant-v2.",
                       paragraph.text)
         # A run that ended before its horizon is not one of the authors' runs cut short.
         ours["Walker2d-v2", "ppo"] = replace(sample(1000), horizon=2)
@@ -196,10 +207,37 @@ class ReportTest(unittest.TestCase):
         lost = self.row("PPO", "released", "hidden=32", "Fish")
         self.assertEqual((lost[4], lost[7:]), ("-", ["-", "1 diverged"]))
 
-    def test_the_ledger_judges_three_sources(self):
-        row = self.row("Q2: Best on the four tasks without termination")
-        self.assertTrue(row[1].startswith("undecided at n = 3: undecided on 1, not measured on 3"))
-        self.assertTrue(row[3].startswith("does not hold at n = 10: holds on 3, does not hold on "))
+    def test_the_first_screen_has_a_word_for_each_claim_and_source(self):
+        row = self.row('Best on the four "infinite horizon" tasks')
+        place = "#best-on-the-four-infinite-horizon-tasks-q2-fig-4b"
+        self.assertEqual(row[1:], [f"[fails]({place}) 3/4", f"[unmeasured]({place})",
+                                   f"[undecided]({place}) 1/1"])
+        self.assertEqual(self.row("As printed")[1:3], ["-", "[unmeasured](#as-printed-varv_bar--v-"
+                                                      "proposition-32)"])
+        self.assertEqual(len(self.rows("Does Option2Vec need options?")), 1)
+
+    def test_the_evidence_has_the_literal_verdict_beside_the_statistical_one(self):
+        text = self.files["REPORT.md"]
+        self.assertIn("- `paper`: first by mean on 1 of 1; **undecided** at n = 3: undecided on 1, "
+                      "not measured on 3", text)
+        self.assertIn("- authors' logs: first by mean on 3 of 4; **does not hold** at n = 10: "
+                      "holds on 3, does not hold on 1 (Reacher-v2 -0.944 [-1.741, -0.146] against "
+                      "PPO, p = 0.023)", text)
+
+    def test_every_link_of_the_text_leads_to_a_heading(self):
+        text = self.files["REPORT.md"]
+        headings = {slug(line.lstrip("# ")) for line in text.splitlines() if line.startswith("#")}
+        links = set(re.findall(r"\]\(#([^)]+)\)", text))
+        self.assertGreater(len(links), 15)
+        self.assertFalse(links - headings)
+
+    def test_the_ledger_for_programs_says_the_same(self):
+        found = json.loads(self.files["claims.json"])
+        self.assertEqual((found["runs_done"], found["runs_of_grid"]), (14, 2560))
+        claim, = (c for c in found["claims"] if c["id"] == "q2-best")
+        self.assertEqual(claim["verdicts"]["authors"], {
+            "word": "fails", "literally": "first by mean on 3 of 4", "seeds": [10, 10]})
+        self.assertEqual(claim["verdicts"]["paper"]["seeds"], [3, 3])
 
     def test_missing_runs_are_named(self):
         self.assertEqual(self.row("HalfCheetah-v2", "seeds")[1],
@@ -217,22 +255,46 @@ class ReportTest(unittest.TestCase):
         self.assertFalse(set(re.findall(r'(?:url\(|href=")#([^")]+)', page)) - set(ids))
         for svg in re.findall(r"<svg.*?</svg>", page, re.DOTALL):
             ElementTree.fromstring(svg)
+        self.assertEqual(page.count("<details>"), page.count("</details>"))
+
+    def test_fills_and_strokes_are_colours_or_what_the_page_has(self):
+        page = self.files["report.html"]
+        ids = set(re.findall(r'\bid="([^"]+)"', page))
+        pictures = "".join(re.findall(r"<svg.*?</svg>", page, re.DOTALL))
+        paints = set(re.findall(r'\b(?:fill|stroke)(?:="|: ?)([^";]+)', pictures))
+        references = {p for p in paints if p.startswith("url")}
+        self.assertFalse({p[5:-1] for p in references} - ids)
+        for paint in paints - references:
+            self.assertRegex(paint, r"^(#[0-9a-f]{6}|none|var\(--(ink|paper)\))$")
+
+    def test_a_page_keeps_the_colours_of_its_figures(self):
+        with tempfile.TemporaryDirectory() as name:
+            cost = cost_figure(Path(name))
+            page = to_html("x", [Picture(cost.name, "", inline_svg(cost))])
+            colours = {c for _, c, _ in fig_cost.FILLS}
+            self.assertEqual(colours & set(re.findall("#[0-9a-f]{6}", svg_of(cost))), colours)
+            # Hatched bars refer to a pattern, which has the colour.
+            for pattern in re.findall(r"url\(#([^)]+)\)", page):
+                self.assertEqual(page.count(f'id="{pattern}"'), 1)
+            patterns = "".join(re.findall(r"<pattern.*?</pattern>", page, re.DOTALL))
+            for colour in colours - {fig_cost.GREY}:
+                self.assertIn(f'fill="{colour}"', patterns)
 
     def test_is_the_same_when_made_again(self):
         self.assertEqual(make(self.results), self.files)
 
     def test_learning_curves_say_what_they_show(self):
-        onestep, *_ = fig_learning_curves.draw(self.results)
-        titles = [panel.get_title() for panel in onestep.figure.axes]
-        self.assertEqual(titles[0], "HalfCheetah-v2\nours, paper: 1 of 2 methods, n = 3")
+        onestep, *_ = fig_learning_curves.draw(Inputs(self.results))
+        titles = [panel.get_title(loc="left") for panel in onestep.figure.axes]
+        self.assertEqual(titles[0], "HalfCheetah-v2, ours, paper\n1 of 2 methods, n = 3")
         self.assertEqual(sum("no runs yet" in title for title in titles), 18)
 
     def test_figures_skip_what_is_not_there(self):
         for module in (fig_cost, fig_embedding):
-            drawing, = module.draw(self.results)
+            drawing, = module.draw(Inputs(self.results))
             self.assertIsNone(drawing.figure)
             self.assertIn("No figure", drawing.caption)
-        paper, released = fig_options.draw(self.results)
+        paper, _, released, _ = fig_options.draw(Inputs(self.results))
         self.assertIsNotNone(paper.figure)
         self.assertIsNone(released.figure)
 
@@ -244,19 +306,39 @@ class ReportTest(unittest.TestCase):
             (folder / "seed-000.csv").write_text(
                 "dimension,embedding_0,embedding_1,effect_0,effect_1,perturbed_0,perturbed_1,delta"
                 "\n0,1,2,0.5,-1,0.25,-0.75,0.5\n1,0,-1,-0.25,0,0.5,-1,0.5\n")
-            (results / "bench.json").write_text(str({"benchmarks": [
-                {"name": f"step/Humanoid-v2/{m}/{f}/iterations:5"} | COUNTERS
-                for m in ("option2vec", "ppo", "oc") for f in ("paper", "released")
-            ]}).replace("'", '"'))
-            embedding, = fig_embedding.draw(results)
-            self.assertEqual(embedding.name, "embedding_paper_Hopper-v2_seed-000")
+            embedding, sheet = fig_embedding.draw(Inputs(results))
+            self.assertEqual(embedding.figure.axes[0].get_title(loc="left"),
+                             "Hopper-v2, seed 0, paper")
+            self.assertEqual([p.get_title(loc="left") for p in sheet.figure.axes],
+                             ["Hopper-v2, seed 0: ±1"])
             # Largest effects 1 (action 1), 0.25 (action 0); changes 0.75 and 1 (action 1) over 0.5.
             bars = embedding.figure.axes[6]
             self.assertEqual([b.get_height() for b in bars.patches], [1, 0.25, 1.5, 2])
             self.assertEqual([t.get_text() for t in bars.texts], ["1", "0", "1", "1"])
-            cost, = fig_cost.draw(results)
+            cost = cost_figure(results)
             self.assertIn("var(--ink)", inline_svg(cost))
             self.assertNotIn("date", svg_of(cost))
+
+
+class CommittedTest(unittest.TestCase):
+    """What is committed is what `make report` writes."""
+
+    def test_readme_has_the_box_of_the_ledger(self):
+        found = json.loads((RESULTS / "claims.json").read_text(encoding="utf-8"))
+        readme = (ROOT / "README.md").read_text(encoding="utf-8")
+        self.assertEqual(ledger.put_box(readme, ledger.box(found)), readme, "make report")
+
+    def test_the_ledger_is_that_of_the_records(self):
+        inputs = Inputs(RESULTS)
+        found = ledger.claims_json(ledger.judge(inputs), inputs, beyond.by_question(inputs))
+        text = (RESULTS / "claims.json").read_text(encoding="utf-8")
+        self.assertEqual(ledger.to_text(found), text, "make report")
+
+    def test_figures_of_the_report_are_there_and_small(self):
+        text = (RESULTS / "REPORT.md").read_text(encoding="utf-8")
+        figures = {RESULTS / name for name in re.findall(r"\]\((figures/[^)]+\.svg)\)", text)}
+        self.assertEqual(figures, set((RESULTS / "figures").iterdir()))
+        self.assertLess(sum(f.stat().st_size for f in figures), 3_000_000)
 
 
 if __name__ == "__main__":

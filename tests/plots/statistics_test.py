@@ -4,7 +4,7 @@ import unittest
 import numpy as np
 from scipy import stats
 
-from plots.statistics import (Moments, bootstrap, holm, improvement, iqm, mean_improvement,
+from plots.statistics import (Moments, Scores, bootstrap, holm, improvement, iqm, mean_improvement,
                               one_sample, seeds_needed, welch)
 
 
@@ -156,6 +156,43 @@ class BootstrapTest(unittest.TestCase):
 
     def test_one_seed_has_no_interval(self):
         self.assertTrue(math.isnan(bootstrap(iqm, np.array([1.0]))[0]))
+
+
+class ScoresTest(unittest.TestCase):
+    def test_a_score_is_in_units_of_the_rivals_mean(self):
+        # (12 - 10) / 10 and (14 - 10) / 10; the rival's mean -4: (-6 + 4) / 4 and (-2 + 4) / 4.
+        scores = Scores.of([(np.array([12.0, 14]), np.array([9.0, 11])),
+                            (np.array([-6.0, -2]), np.array([-4.0, -4]))])
+        np.testing.assert_allclose(scores.runs, [[0.2, 0.4], [-0.5, 0.5]])
+        np.testing.assert_allclose([mean for mean, _ in scores.means()], [0.3, 0])
+        # Sorted -0.5, 0.2, 0.4, 0.5: the middle half is 0.2 and 0.4.
+        self.assertAlmostEqual(scores.iqm()[0], 0.3)
+
+    def test_the_rivals_runs_are_drawn_again_too(self):
+        # One run of the method against [1, 3]: means 1, 2, 3 with 1/4, 1/2, 1/4, scores of 6 are
+        # 5, 2, 1; the 2.5 and 97.5 percentiles are the outer two.
+        scores = Scores.of([(np.array([6.0, 6]), np.array([1.0, 3]))])
+        (mean, (low, high)), = scores.means()
+        self.assertEqual((mean, low, high), (2, 1, 5))
+
+    def test_tasks_and_methods_are_strata(self):
+        # Every task has both of its runs alike, so that no resample differs, whatever the tasks'.
+        scores = Scores.of([(np.array([2.0, 2]), np.array([1.0, 1])),
+                            (np.array([9.0, 9]), np.array([1.0, 1]))])
+        value, interval = scores.iqm()
+        self.assertEqual((value, interval), (4.5, (4.5, 4.5)))  # of 1, 1, 8, 8
+
+    def test_the_profile_is_the_share_above_a_threshold_and_tasks_count_alike(self):
+        # Scores 0, 1 of one task, 2 alone of the other: above 0.5 a half and all, mean 3/4.
+        scores = Scores.of([(np.array([1.0, 2]), np.array([1.0, 1])),
+                            (np.array([3.0]), np.array([1.0]))])
+        share, band = scores.profile(np.array([-0.5, 0, 0.5, 1.5, 2]))
+        np.testing.assert_allclose(share, [1, 0.75, 0.75, 0.5, 0])
+        np.testing.assert_allclose(band[:, 2], [0.5, 1])  # of two draws none, one or both are 1
+
+    def test_a_single_run_has_no_interval(self):
+        (_, (low, high)), = Scores.of([(np.array([3.0]), np.array([1.0, 2]))]).means()
+        self.assertTrue(math.isnan(low) and math.isnan(high))
 
 
 class SeedsNeededTest(unittest.TestCase):
