@@ -34,7 +34,9 @@ class TimedEnv final : public Env {
     *seconds_ += SecondsSince(start);
     return result;
   }
-  void Visit(StateVisitor& v, const std::string& prefix) override { env_->Visit(v, prefix); }
+  void Serialize(StateVisitor& v, const std::string& prefix) override {
+    env_->Serialize(v, prefix);
+  }
 
  private:
   std::unique_ptr<Env> env_;
@@ -49,7 +51,7 @@ struct Cost {
   double products = 0, adam = 0;               // of the bound, CPU seconds
 
   double Bound() const { return physics + products + adam; }
-  double Ratio() const { return total / Bound(); }
+  double SumAndCount() const { return total / Bound(); }
 };
 
 /// An iteration is the least rollouts and updates that fill kSteps environment steps, and then the
@@ -104,7 +106,7 @@ void StepCost(benchmark::State& state, const std::string& task, const std::strin
     state.ResumeTiming();
   }
   const auto median = costs.begin() + std::ptrdiff_t(costs.size() / 2);
-  std::ranges::nth_element(costs, median, {}, &Cost::Ratio);
+  std::ranges::nth_element(costs, median, {}, &Cost::SumAndCount);
 
   const double scale = 1e6 / double(median->steps);  // [us an environment step]
   double mflop = 0;
@@ -117,7 +119,7 @@ void StepCost(benchmark::State& state, const std::string& task, const std::strin
   state.counters["bound_products_us"] = median->products * scale;
   state.counters["bound_adam_us"] = median->adam * scale;
   state.counters["MFLOP"] = mflop;
-  state.counters["ratio"] = median->Ratio();
+  state.counters["ratio"] = median->SumAndCount();
 }
 
 /// Option2Vec and PPO on every gym task and one of each domain of DeepMind Control, where a

@@ -62,7 +62,7 @@ inline Comparison Compare(const std::vector<Slot>& slots, Rng& rng,
     std::set<Index> entries = {top};
     for (Index i = 0; n <= most && i < n; ++i) entries.insert(i);
     while (static_cast<Index>(entries.size()) < std::min(n, most)) {
-      entries.insert(static_cast<Index>(rng.Below(static_cast<std::uint64_t>(n))));
+      entries.insert(static_cast<Index>(rng.UniformInt(static_cast<std::uint64_t>(n))));
     }
     for (const Index i : entries) {
       const double x = slot.value[i];
@@ -104,7 +104,7 @@ struct Verdict {
 };
 
 /// Error of an entry: |g - n| / max(|g|, |n|, 1e-3 max|g| of the stage). Source: spec 10.2.
-inline Verdict Judge(const Comparison& comparison) {
+inline Verdict RewardAndEnd(const Comparison& comparison) {
   Verdict verdict;
   for (const Compared& t : comparison) {
     verdict.largest_gradient = std::max(verdict.largest_gradient, t.largest);

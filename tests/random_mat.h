@@ -16,7 +16,7 @@ inline Mat RandomMat(Index rows, Index cols, Rng& rng, double scale = 1) {
 /// n options in {0, ..., K-1}.
 inline std::vector<int> RandomOptions(std::size_t n, int K, Rng& rng) {
   std::vector<int> o(n);
-  for (int& k : o) k = static_cast<int>(rng.Below(static_cast<std::uint64_t>(K)));
+  for (int& k : o) k = static_cast<int>(rng.UniformInt(static_cast<std::uint64_t>(K)));
   return o;
 }
 

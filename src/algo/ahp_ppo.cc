@@ -32,7 +32,7 @@ class AhpPpo final : public PpoMethod {
   void Values(const Choices& x, Index row) override;
 
   struct Cache {
-    OptionNets::Process options;
+    OptionNets::CallAndReturnCache options;
     ActionCache action;      // action.logp is ln p
     ValueCache value;        // value.critic.out is u (K + 1, B)
     std::vector<int> o;      // (B)
@@ -43,10 +43,11 @@ class AhpPpo final : public PpoMethod {
   /// ln p without its Gaussian factor for samples (stop, o), added to logp (B). x (B): the option
   /// whose termination enters, evaluated in c.
   void AddLogAugmented(std::span<const char> stop, std::span<const int> o, std::span<const int> x,
-                       std::span<const char> init, const OptionNets::Process& c, Vec& logp) const;
+                       std::span<const char> init, const OptionNets::CallAndReturnCache& c,
+                       Vec& logp) const;
   /// Its adjoints, from dlogp (B).
   void AugmentedBackward(const Batch& batch, std::span<const int> x, const Vec& dlogp,
-                         OptionNets::Process& c);
+                         OptionNets::CallAndReturnCache& c);
   /// Whether the factor of the termination enters at a state.
   bool Terminates(char init) const {
     return !init || switches_.ahp_init_factor == Fidelity::kReleased;
@@ -76,7 +77,7 @@ void AhpPpo::Entries(std::span<const int> o_prev, std::span<const char> init,
 
 void AhpPpo::AddLogAugmented(std::span<const char> stop, std::span<const int> o,
                              std::span<const int> x, std::span<const char> init,
-                             const OptionNets::Process& c, Vec& logp) const {
+                             const OptionNets::CallAndReturnCache& c, Vec& logp) const {
   for (Index b = 0; b < logp.size(); ++b) {
     const std::size_t i = std::size_t(b);
     if (Terminates(init[i])) {
@@ -90,7 +91,7 @@ void AhpPpo::AddLogAugmented(std::span<const char> stop, std::span<const int> o,
 
 /// kappa = dL/dln p:  db_x = kappa (b - beta_x),  dz_j = kappa b (delta_jo - pi_j); spec 4.4 (e)
 void AhpPpo::AugmentedBackward(const Batch& batch, std::span<const int> x, const Vec& dlogp,
-                               OptionNets::Process& c) {
+                               OptionNets::CallAndReturnCache& c) {
   Mat &db = c.beta.db, &dz = c.master.dout;
   db.setZero(K_, batch.Size());
   dz.setZero(K_, batch.Size());
@@ -125,7 +126,7 @@ void AhpPpo::Act(const Mat& s, std::span<const char> init, Index row) {
   SampleAction(nets_.policy, s, c.o, policy_rng_, a_, c.action);
   AddLogAugmented(c.stop, c.o, o_prev_, init, c.options, c.action.logp);
   LogDensity(switches_.density_log_eps, c.action.logp, c.action.slope);
-  batch.low.logp_old.segment(row, N_) = c.action.logp;
+  batch.action.logp_old.segment(row, N_) = c.action.logp;
   std::copy(c.stop.begin(), c.stop.end(), batch.stop.begin() + row);
   RecordOptions(row, c.o, init, batch);
 }
@@ -151,7 +152,7 @@ LossTerms AhpPpo::Loss(int, const Batch& batch, const FixedDraws*) {
   AugmentedBackward(batch, x, c.action.dlogp, c.options);
 
   Entries(batch.o_prev, batch.init, c.entry);
-  EntryValueLoss(nets_.critic, batch.s, c.entry, batch.low.ret, terms, c.value);
+  EntryValueLoss(nets_.critic, batch.s, c.entry, batch.action.ret, terms, c.value);
   terms.total = terms.surrogate + terms.value;
   return terms;
 }
@@ -159,7 +160,7 @@ LossTerms AhpPpo::Loss(int, const Batch& batch, const FixedDraws*) {
 /// P(o | s, o') = (1 - beta_{o'}) delta_{o o'} + beta_{o'} pi_o, as b and the candidate are drawn.
 void AhpPpo::OptionPolicy(const Mat& s, const std::vector<int>& o_prev,
                           const std::vector<char>& init, Mat& P) {
-  OptionNets::Process& c = caches_(s.cols()).options;
+  OptionNets::CallAndReturnCache& c = caches_(s.cols()).options;
   nets_.Master(s, c);
   nets_.CallAndReturn(s, o_prev, init, c.pi, Fidelity::kPaper, c);
   P = c.pi_hat;

@@ -45,7 +45,7 @@ struct LossTerms {
 /// A statistic of an update, as what it is made of: a sum over n minibatches, steps or executions
 /// of an option. Those of several updates are added up, each part for itself. Where n is 0 (no
 /// execution began) the value is the sum.
-struct Ratio {
+struct SumAndCount {
   double sum = 0, n = 0;
   double Value() const { return sum / std::max(1.0, n); }
 };
@@ -64,7 +64,7 @@ class Learner {
   /// One rollout. Appends the episodes that ended.
   virtual void Collect(VecEnv& env, std::vector<Episode>& episodes) = 0;
   /// All epochs over it. Returns a statistic for each of StatNames().
-  virtual const std::vector<Ratio>& Update() = 0;
+  virtual const std::vector<SumAndCount>& Update() = 0;
   /// Columns of updates.csv after `step`.
   virtual std::vector<std::string> StatNames() const = 0;
   /// The workers have been put on another task, between two updates. Nothing is frozen or reset by
@@ -73,7 +73,7 @@ class Learner {
   /// All trainable arrays in the order of the network; names as in the checkpoint format.
   virtual std::vector<Param*> Params() = 0;
   /// All state that a resumed run needs, the parameters included.
-  virtual void Visit(StateVisitor& v) = 0;
+  virtual void Serialize(StateVisitor& v) = 0;
 };
 
 /// What the networks of a method say: for evaluation, films and analysis. Dropout is off; the

@@ -45,15 +45,15 @@ class DacOneStep final : public DoubleActorCritic {
   void OptionBackward(const ConstMatRef& s, std::span<const int> o_prev, std::span<const char> init,
                       const Mat& dp) override;
 
-  Net policy_net_;  // of [s, o']
+  Mlp policy_net_;  // of [s, o']
   LayerNorm norm_;  // with the numeric index only
   Linear y0_, y1_;  // the net y, with swapped roles only
-  Net critic_net_;
-  OptionPolicies policies_;
+  Mlp critic_net_;
+  IntraOptionPolicies policies_;
   // The authors' network keeps the head and the terminations that nobody uses; they count, and
   // exist only when all three switches are `released` (spec 2.4).
   std::vector<Linear> unused_head_;
-  OptionBank unused_beta_;
+  PerOptionMlps unused_beta_;
   CacheByWidth<Cache> caches_;
 };
 
@@ -62,7 +62,7 @@ DacOneStep::DacOneStep(const AlgorithmInput& in) : DoubleActorCritic(in) {
   const Activation g = ReadActivation(*in.hyper);
   const std::string name = NumericIndex() ? "master" : "policy";
   const Index n_in = in.S + (NumericIndex() ? 1 : K_);
-  policy_net_ = Net(name + ".body", name + ".head", n_in, h, K_, g, init_);
+  policy_net_ = Mlp(name + ".body", name + ".head", n_in, h, K_, g, init_);
   if (NumericIndex()) norm_ = LayerNorm(name + ".ln", n_in);
   if (Swapped()) {
     y0_ = Linear("ynet.0", in.S, h_y);
@@ -70,11 +70,11 @@ DacOneStep::DacOneStep(const AlgorithmInput& in) : DoubleActorCritic(in) {
     init_.XavierUniform(y0_.W.value);
     init_.XavierUniform(y1_.W.value);
   }
-  critic_net_ = Net("critic.body", "critic.q", in.S, h, K_, g, init_);
-  policies_ = OptionPolicies(K_, in.S, in.A, h, g, init_);
+  critic_net_ = Mlp("critic.body", "critic.q", in.S, h, K_, g, init_);
+  policies_ = IntraOptionPolicies(K_, in.S, in.A, h, g, init_);
   if (NumericIndex() && Swapped() && Unnormalised()) {
     unused_head_.emplace_back("critic.u", h, K_ + 1);
-    unused_beta_ = OptionBank("beta", K_, in.S, h, 1, g, init_);
+    unused_beta_ = PerOptionMlps("beta", K_, in.S, h, 1, g, init_);
   }
   std::vector<Param*> option_policy = policy_net_.Params();
   if (NumericIndex()) Append(option_policy, norm_.Params());

@@ -22,7 +22,7 @@ class DacPpo final : public DoubleActorCritic {
  private:
   void OptionForward(const ConstMatRef& s, std::span<const int> o_prev, std::span<const char> init,
                      When when, Mat& p) override {
-    OptionNets::Process& c = caches_(s.cols());
+    OptionNets::CallAndReturnCache& c = caches_(s.cols());
     nets_.Master(s, c);
     nets_.CallAndReturn(s, o_prev, init, c.pi, switches_.beta_index, c);
     if (when == When::kUpdate && switches_.dac_update_mask == Fidelity::kReleased) {
@@ -36,7 +36,7 @@ class DacPpo final : public DoubleActorCritic {
 
   void OptionBackward(const ConstMatRef& s, std::span<const int> o_prev, std::span<const char> init,
                       const Mat& dp) override {
-    OptionNets::Process& c = caches_(s.cols());
+    OptionNets::CallAndReturnCache& c = caches_(s.cols());
     CallAndReturnBackward(dp, c.pi, c.beta.beta, c.M, o_prev, init, switches_.beta_index,
                           c.master.dout, c.beta.db);
     nets_.master.Backward(s, c.master);
@@ -44,7 +44,7 @@ class DacPpo final : public DoubleActorCritic {
   }
 
   OptionNets nets_;
-  CacheByWidth<OptionNets::Process> caches_;
+  CacheByWidth<OptionNets::CallAndReturnCache> caches_;
 };
 
 }  // namespace

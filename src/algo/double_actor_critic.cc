@@ -12,8 +12,8 @@ DoubleActorCritic::DoubleActorCritic(const AlgorithmInput& in)
       option_log_(in.switches.density_log_eps) {}
 
 void DoubleActorCritic::RegisterStages(const AlgorithmInput& in, std::vector<Param*> all,
-                                       std::vector<Param*> option_policy, OptionPolicies* policy,
-                                       Net* critic) {
+                                       std::vector<Param*> option_policy,
+                                       IntraOptionPolicies* policy, Mlp* critic) {
   std::vector<Param*> action_policy;
   for (Index k = 0; k < K_; ++k) Append(action_policy, policy->Params(k));
   Append(option_policy, critic->Params());
@@ -39,7 +39,7 @@ void DoubleActorCritic::DrawActions(const ConstMatRef& s, std::span<const int> o
 }
 
 const Mat& DoubleActorCritic::Critic(const ConstMatRef& s, std::span<const int>) {
-  Net::Cache& c = caches_(s.cols()).value.critic;
+  Mlp::Cache& c = caches_(s.cols()).value.critic;
   critic_->Forward(s, c);
   return c.out;
 }
@@ -47,15 +47,15 @@ const Mat& DoubleActorCritic::Critic(const ConstMatRef& s, std::span<const int>)
 LossTerms DoubleActorCritic::OptionLoss(const Batch& batch, const FixedDraws*) {
   LossTerms terms;
   Cache& c = caches_(batch.Size());
-  Net::Cache& critic = c.value.critic;
+  Mlp::Cache& critic = c.value.critic;
   OptionForward(batch.s, batch.o_prev, batch.init, When::kUpdate, c.p);
   critic_->Forward(batch.s, critic);
   option_log_.Log(c.p, c.log_p);
   PickRows(c.log_p, batch.o, c.logp);
-  ClippedSurrogate(c.logp, batch.high.logp_old, batch.high.adv_hat, clip_, terms, c.dlogp);
+  ClippedSurrogate(c.logp, batch.option.logp_old, batch.option.adv_hat, clip_, terms, c.dlogp);
   terms.entropy = MeanEntropy(c.p, c.log_p);
   c.value.v = batch.P_old.cwiseProduct(critic.out).colwise().sum().transpose();
-  ValueLoss(c.value.v, batch.high.ret, terms, c.value.dv);
+  ValueLoss(c.value.v, batch.option.ret, terms, c.value.dv);
   terms.total = terms.surrogate - w_ * terms.entropy + terms.value;
 
   option_log_.Backward(c.p, batch.o, c.dlogp, -w_, c.dp);
@@ -71,7 +71,7 @@ LossTerms DoubleActorCritic::ActionLoss(const Batch& batch, const FixedDraws*) {
   ActionLogProb(*policy_, batch, c.action);
   ActionSurrogate(*policy_, batch, switches_.density_log_eps, clip_, terms, c.action);
   terms.entropy = GaussianMeanEntropy(c.action.policy.sigma);
-  EntryValueLoss(*critic_, batch.s, batch.o, batch.low.ret, terms, c.value);
+  EntryValueLoss(*critic_, batch.s, batch.o, batch.action.ret, terms, c.value);
   terms.total = terms.surrogate + terms.value;
   return terms;
 }

@@ -27,7 +27,7 @@ class DoubleActorCritic : public TwoStageMethod {
   /// RegisterNetworks for both stages. all: every parameter in the order of the network, the
   /// unused ones included; option_policy: those of the option policy. The critic's output is q.
   void RegisterStages(const AlgorithmInput& in, std::vector<Param*> all,
-                      std::vector<Param*> option_policy, OptionPolicies* policy, Net* critic);
+                      std::vector<Param*> option_policy, IntraOptionPolicies* policy, Mlp* critic);
 
   /// s (S, B), o_prev, init (B) -> p (K, B).
   virtual void OptionForward(const ConstMatRef& s, std::span<const int> o_prev,

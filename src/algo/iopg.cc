@@ -29,9 +29,9 @@ class Iopg final : public Method {
 
   /// Steps the workers until at least one episode ends.
   void Collect(VecEnv& env, std::vector<Episode>& episodes) override;
-  const std::vector<Ratio>& Update() override;
+  const std::vector<SumAndCount>& Update() override;
   void ChangeTask() override;
-  void Visit(StateVisitor& v) override;
+  void Serialize(StateVisitor& v) override;
   void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
                     Mat& P) override;
   /// The batch is one episode, its rewards in batch.r.
@@ -54,9 +54,9 @@ class Iopg final : public Method {
   /// What a block of an episode leaves behind.
   struct Block {
     Mat s, a;  // (S, kBlock); (A, K kBlock), the actions once for each option
-    OptionNets::Process options;
-    Net::Cache critic;
-    OptionPolicies::Cache policy;
+    OptionNets::CallAndReturnCache options;
+    Mlp::Cache critic;
+    IntraOptionPolicies::Cache policy;
     Vec logp, dlogp;  // (K kBlock) option after option
   };
 
@@ -89,7 +89,7 @@ class Iopg final : public Method {
   std::vector<Worker> workers_;
 
   std::vector<int> finished_;  // workers whose episodes ended in the last step
-  CacheByWidth<OptionNets::Process> options_;
+  CacheByWidth<OptionNets::CallAndReturnCache> options_;
   // As many as the longest episode so far has needed: what the time limit allows would be tens of
   // megabytes. A longer episode adds to them, once, and nothing else on the training path allocates
   // after the first update.
@@ -134,8 +134,8 @@ void Iopg::ChangeTask() {
   for (Worker& worker : workers_) worker.length = 0;
 }
 
-void Iopg::Visit(StateVisitor& v) {
-  Method::Visit(v);
+void Iopg::Serialize(StateVisitor& v) {
+  Method::Serialize(v);
   for (std::size_t i = 0; i < workers_.size(); ++i) {
     Worker& worker = workers_[i];
     const std::string name = "copy" + std::to_string(i) + ".";
@@ -154,7 +154,7 @@ void Iopg::Visit(StateVisitor& v) {
 
 const Mat& Iopg::Options(OptionNets& nets, const ConstMatRef& s, std::span<const int> o_prev,
                          std::span<const char> init) {
-  OptionNets::Process& c = options_(s.cols());
+  OptionNets::CallAndReturnCache& c = options_(s.cols());
   nets.Master(s, c);
   if (AlwaysInitial()) return c.pi;
   nets.CallAndReturn(s, o_prev, init, c.pi, switches_.beta_index, c);
@@ -163,15 +163,15 @@ const Mat& Iopg::Options(OptionNets& nets, const ConstMatRef& s, std::span<const
 
 void Iopg::Collect(VecEnv& env, std::vector<Episode>& episodes) {
   finished_.clear();
-  Asked& c = asked_(1);
+  QueryCache& c = query_caches_(1);
   while (finished_.empty()) {
     for (std::size_t i = 0; i < workers_.size(); ++i) {
       Worker& worker = workers_[i];
       const auto s = env.States().col(Index(i));
-      const bool init = env.Init()[i];
+      const bool init = env.EpisodeStarts()[i];
       Check(worker.length < worker.r.size(), "iopg: an episode of more than ", worker.r.size(),
             " steps, twice the time limit of the task it was made for");
-      SampleCategorical(Options(worker.nets, s, {&worker.o_prev, 1}, {&env.Init()[i], 1}),
+      SampleCategorical(Options(worker.nets, s, {&worker.o_prev, 1}, {&env.EpisodeStarts()[i], 1}),
                         policy_rng_, o_one_);
       worker.nets.policy.ForwardOne(s, o_one_, c.policy);
       SampleGaussian(c.policy.nets.out, c.policy.sigma, policy_rng_, a_one_);
@@ -197,7 +197,7 @@ void Iopg::Collect(VecEnv& env, std::vector<Episode>& episodes) {
   }
 }
 
-const std::vector<Ratio>& Iopg::Update() {
+const std::vector<SumAndCount>& Iopg::Update() {
   for (const int i : finished_) {
     Worker& worker = workers_[std::size_t(i)];
     const Index n = worker.length;

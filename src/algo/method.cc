@@ -17,7 +17,7 @@ void OptionUsage::Count(int o, int o_prev, bool init) {
   begun_[std::size_t(o)] += init || o != o_prev;
 }
 
-void OptionUsage::Report(std::vector<Ratio>& ratios) const {
+void OptionUsage::Report(std::vector<SumAndCount>& ratios) const {
   const double steps = std::accumulate(executed_.begin(), executed_.end(), 0.0);
   for (const double n : executed_) ratios.push_back({n, steps});
   for (std::size_t k = 0; k < executed_.size(); ++k) ratios.push_back({executed_[k], begun_[k]});
@@ -42,7 +42,7 @@ void Method::RecordOptions(Index column, std::span<const int> o, std::span<const
   }
 }
 
-const std::vector<Ratio>& Method::Report() {
+const std::vector<SumAndCount>& Method::Report() {
   ratios_.clear();
   for (LossMeans& means : means_) {
     means.Report(ratios_);
@@ -81,7 +81,7 @@ Rng& Method::NewStream(const std::string& name) {
 
 void Method::RegisterNetworks(const AlgorithmInput& in, std::vector<Param*> all,
                               std::initializer_list<std::vector<Param*>> stages,
-                              OptionPolicies* policy, Net* critic) {
+                              IntraOptionPolicies* policy, Mlp* critic) {
   policy_ = policy;
   critic_ = critic;
   params_ = std::move(all);
@@ -95,10 +95,10 @@ void Method::RegisterNetworks(const AlgorithmInput& in, std::vector<Param*> all,
                              s.Real("adam_eps"), s.Real("clip_norm")});
 }
 
-void Method::Visit(StateVisitor& v) {
+void Method::Serialize(StateVisitor& v) {
   for (Param* p : params_) v.Matrix(p->name, p->value);
-  adam_->Visit(v);
-  for (auto& [name, rng] : streams_) rng.Visit(v, "rng." + name);
+  adam_->Serialize(v);
+  for (auto& [name, rng] : streams_) rng.Serialize(v, "rng." + name);
   if (!o_prev_.empty()) v.AllBelow("o_prev", o_prev_, K_);
 }
 
@@ -121,14 +121,14 @@ OptionNets MakeOptionNets(const AlgorithmInput& in, OptionNets::CriticHead head,
 // ---- Queries ------------------------------------------------------------------------------------
 
 void Method::ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, Mat& sigma) {
-  OptionPolicies::Cache& c = asked_(s.cols()).policy;
+  IntraOptionPolicies::Cache& c = query_caches_(s.cols()).policy;
   policy_->ForwardOne(s, o, c);
   mu = c.nets.out;
   sigma = c.sigma;
 }
 
 void Method::OptionValues(const Mat& s, const std::vector<int>&, Mat& q) {
-  Net::Cache& c = asked_(s.cols()).critic;
+  Mlp::Cache& c = query_caches_(s.cols()).critic;
   critic_->Forward(s, c);
   q = c.out.topRows(NumOptions());
 }

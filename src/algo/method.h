@@ -44,7 +44,7 @@ class OptionUsage {
   /// Appends each option's share of the steps, then the mean length [steps] of its executions: its
   /// steps by the executions that began. Cut anywhere and added up again they are the same: an
   /// execution counts once, where it began, and its steps where they are.
-  void Report(std::vector<Ratio>& ratios) const;
+  void Report(std::vector<SumAndCount>& ratios) const;
   /// The columns of Report.
   void Names(std::vector<std::string>& names) const;
 
@@ -62,7 +62,7 @@ class Method : public Algorithm {
 
  public:
   /// Parameters, optimiser, random streams and o_prev_.
-  void Visit(StateVisitor& v) override;
+  void Serialize(StateVisitor& v) override;
   /// Of each stage the columns of LossMeans, then those of OptionUsage.
   std::vector<std::string> StatNames() const override;
 
@@ -78,9 +78,9 @@ class Method : public Algorithm {
   std::vector<char> InGraph(int stage) const override { return in_graph_[std::size_t(stage)]; }
 
  protected:
-  struct Asked {
-    OptionPolicies::Cache policy;
-    Net::Cache critic;
+  struct QueryCache {
+    IntraOptionPolicies::Cache policy;
+    Mlp::Cache critic;
   };
 
   /// K = 0: a method without options. more: columns of updates.csv beside those of all methods.
@@ -92,8 +92,8 @@ class Method : public Algorithm {
   /// all: every parameter in the order of the network; stages: those that each stage's loss
   /// reaches. A method that answers the queries itself has neither policy nor critic.
   void RegisterNetworks(const AlgorithmInput& in, std::vector<Param*> all,
-                        std::initializer_list<std::vector<Param*>> stages, OptionPolicies* policy,
-                        Net* critic);
+                        std::initializer_list<std::vector<Param*>> stages,
+                        IntraOptionPolicies* policy, Mlp* critic);
 
   /// A step of the optimiser on the gradients of a loss with these terms.
   void StepOn(int stage, const LossTerms& terms) { means_[stage].Add(terms, Step(stage)); }
@@ -110,7 +110,7 @@ class Method : public Algorithm {
   void RecordOptions(Index column, std::span<const int> o, std::span<const char> init,
                      Batch& rollout);
   /// The numbers of StatNames() of all steps since the last call.
-  const std::vector<Ratio>& Report();
+  const std::vector<SumAndCount>& Report();
 
   const Switches switches_;
   const Index K_;
@@ -121,16 +121,16 @@ class Method : public Algorithm {
   std::vector<int> o_prev_;                  // (N), empty where a method keeps them elsewhere
   OptionUsage usage_;
   Rng& policy_rng_ = NewStream("policy");  // of options and actions drawn while acting
-  CacheByWidth<Asked> asked_;              // scratch of the queries
-  OptionPolicies* policy_ = nullptr;       // the method's
-  Net* critic_ = nullptr;
+  CacheByWidth<QueryCache> query_caches_;  // scratch of the queries
+  IntraOptionPolicies* policy_ = nullptr;  // the method's
+  Mlp* critic_ = nullptr;
 
  private:
   const std::vector<std::string> stages_;
   const LossColumns more_;
   std::unique_ptr<Adam> adam_;
-  std::vector<LossMeans> means_;  // of each stage
-  std::vector<Ratio> ratios_;     // of the last Report
+  std::vector<LossMeans> means_;     // of each stage
+  std::vector<SumAndCount> ratios_;  // of the last Report
 };
 
 /// `activation` of a method's numbers, tanh or relu.

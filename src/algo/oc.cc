@@ -24,15 +24,15 @@ class OptionCritic final : public Method {
   explicit OptionCritic(const AlgorithmInput& in);
 
   void Collect(VecEnv& env, std::vector<Episode>& episodes) override;
-  const std::vector<Ratio>& Update() override;
-  void Visit(StateVisitor& v) override;
+  const std::vector<SumAndCount>& Update() override;
+  void Serialize(StateVisitor& v) override;
   void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
                     Mat& P) override;
   LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) override;
 
  private:
   struct Cache {
-    OptionNets::Process options;
+    OptionNets::CallAndReturnCache options;
     OptionNets::BetaCache target_beta;  // of o, of the target network
     ActionCache action;
     ValueCache value;    // value.critic.out is q (K, B)
@@ -93,8 +93,8 @@ void OptionCritic::CopyToTarget() {
   for (std::size_t i = 0; i < params_.size(); ++i) target_params_[i]->value = params_[i]->value;
 }
 
-void OptionCritic::Visit(StateVisitor& v) {
-  Method::Visit(v);
+void OptionCritic::Serialize(StateVisitor& v) {
+  Method::Serialize(v);
   for (Param* p : target_params_) v.Matrix("target." + p->name, p->value);
 }
 
@@ -132,17 +132,17 @@ void OptionCritic::TargetValue(const ConstMatRef& s, std::span<const int> o, Cac
 
 void OptionCritic::Collect(VecEnv& env, std::vector<Episode>& episodes) {
   Cache& c = caches_(N_);
-  OptionPolicies::Cache& policy = c.action.policy;
+  IntraOptionPolicies::Cache& policy = c.action.policy;
   c.o.resize(std::size_t(N_));
   for (int t = 0; t < T_; ++t) {
     const Index column = Index(t) * N_;
     const Mat& s = env.States();
-    SampleCategorical(Options(s, o_prev_, env.Init()), policy_rng_, c.o);
+    SampleCategorical(Options(s, o_prev_, env.EpisodeStarts()), policy_rng_, c.o);
     nets_.policy.ForwardOne(s, c.o, policy);
     SampleGaussian(policy.nets.out, policy.sigma, policy_rng_, a_);
     rollout_.s.middleCols(column, N_) = s;
     rollout_.a.middleCols(column, N_) = a_;
-    RecordOptions(column, c.o, env.Init(), rollout_);
+    RecordOptions(column, c.o, env.EpisodeStarts(), rollout_);
 
     env.Step(a_, transition_, episodes);
     rollout_.r.segment(column, N_) = transition_.r;
@@ -178,7 +178,7 @@ LossTerms OptionCritic::Loss(int, const Batch& batch, const FixedDraws*) {
   Targets(batch, c.ret);
   EntryValueLoss(nets_.critic, batch.s, batch.o, c.ret, terms, c.value);
 
-  OptionPolicies::Cache& policy = c.action.policy;
+  IntraOptionPolicies::Cache& policy = c.action.policy;
   Vec &logp = c.action.logp, &dlogp = c.action.dlogp;
   ActionLogProb(nets_.policy, batch, c.action);
   dlogp = Real(1) / Real(batch.Size()) * (c.value.v - c.ret);  // -A / n
@@ -214,7 +214,7 @@ void OptionCritic::TerminationLoss(const Batch& batch, LossTerms& terms, Cache& 
   nets_.BackwardBeta(batch.s, batch.o_prev, betas);
 }
 
-const std::vector<Ratio>& OptionCritic::Update() {
+const std::vector<SumAndCount>& OptionCritic::Update() {
   Learn(0, rollout_);
   return Report();
 }

@@ -30,7 +30,7 @@ class Option2Vec final : public TwoStageMethod {
   explicit Option2Vec(const AlgorithmInput& in);
 
   void ChangeTask() override { Freeze(); }
-  void Visit(StateVisitor& v) override;
+  void Serialize(StateVisitor& v) override;
   void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
                     Mat& P) override;
   void ActionPolicy(const Mat& s, const std::vector<int>& o, Mat& mu, Mat& sigma) override;
@@ -41,7 +41,7 @@ class Option2Vec final : public TwoStageMethod {
  private:
   /// What a batch of B samples leaves behind.
   struct Cache {
-    OptionPolicyNet::Cache options;
+    PolicyOverOptions::Cache options;
     ActionPolicyNet::Cache action;
     OptionValueNet::Cache all, one;  // the critic of every option; of the option fed
     std::vector<int> o;              // (B) option that action net and critic are fed
@@ -69,13 +69,13 @@ class Option2Vec final : public TwoStageMethod {
   const bool scalar_critic_;
   Rng &dropout_rng_ = NewStream("dropout"), &redraw_rng_ = NewStream("redraw");
 
-  OptionPolicyNet options_;
+  PolicyOverOptions options_;
   ActionPolicyNet action_;
   OptionValueNet critic_net_;
   std::vector<LayerNorm> unused_;         // one or none: spec 2.6 item 9
   std::vector<std::size_t> init_params_;  // positions of the initial net in Params()
   bool frozen_ = false;                   // the task has changed, and o2v_freeze acts
-  OptionPolicyNet::Tables tables_;        // of the weights as they stood when they were made
+  PolicyOverOptions::Tables tables_;      // of the weights as they stood when they were made
   Mat action_table_, critic_table_;
   CacheByWidth<Cache> caches_;
 };
@@ -99,10 +99,10 @@ Option2Vec::Option2Vec(const AlgorithmInput& in)
       w_a_(in.hyper->Real("entropy_weight_action")),
       sizes_(ReadSizes(in)),
       scalar_critic_(Paper(switches_.o2v_critic)) {
-  const OptionPolicyNet::Form form{.two_tokens = !Paper(switches_.o2v_query),
-                                   .init_relu = !Paper(switches_.o2v_init_relu),
-                                   .prev_embed_grad = Paper(switches_.o2v_prev_embed_grad)};
-  options_ = OptionPolicyNet(sizes_, form, init_);
+  const PolicyOverOptions::Form form{.two_tokens = !Paper(switches_.o2v_query),
+                                     .init_relu = !Paper(switches_.o2v_init_relu),
+                                     .prev_embed_grad = Paper(switches_.o2v_prev_embed_grad)};
+  options_ = PolicyOverOptions(sizes_, form, init_);
   action_ = ActionPolicyNet(sizes_, init_);
   critic_net_ = OptionValueNet(sizes_, scalar_critic_, init_);
   // The authors' network allocates one more LayerNorm; it counts, and exists only when every switch
@@ -124,8 +124,8 @@ Option2Vec::Option2Vec(const AlgorithmInput& in)
   }
 }
 
-void Option2Vec::Visit(StateVisitor& v) {
-  Method::Visit(v);
+void Option2Vec::Serialize(StateVisitor& v) {
+  Method::Serialize(v);
   int frozen = frozen_;
   v.Below("frozen", frozen, 2);
   if (frozen && !frozen_) Freeze();
@@ -228,10 +228,10 @@ LossTerms Option2Vec::OptionLoss(const Batch& batch, const FixedDraws* fixed) {
     c.logp(b) = log_P(batch.o[std::size_t(b)], b);
     c.v(b) = P.col(b).dot(q.col(b));
   }
-  ClippedSurrogate(c.logp, batch.high.logp_old, batch.high.adv_hat, clip_, terms, c.dlogp);
+  ClippedSurrogate(c.logp, batch.option.logp_old, batch.option.adv_hat, clip_, terms, c.dlogp);
   CategoricalEntropy(log_P, P, c.H);
   terms.entropy = double(c.H.sum()) / double(B);
-  ValueLoss(c.v, batch.high.ret, terms, c.dv);
+  ValueLoss(c.v, batch.option.ret, terms, c.dv);
   terms.total = terms.surrogate - w_o_ * terms.entropy + terms.value;
 
   // Spec 4.8 (e).
@@ -277,7 +277,7 @@ LossTerms Option2Vec::ActionLoss(const Batch& batch, const FixedDraws* fixed) {
   const Mat &mu = c.action.mu, &sigma = c.action.sigma;
   action_.Forward(batch.s, c.o, action_table_, c.action);
   GaussianLogProb(batch.a, mu, sigma, c.logp);
-  ClippedSurrogate(c.logp, batch.low.logp_old, batch.low.adv_hat, clip_, terms, c.dlogp);
+  ClippedSurrogate(c.logp, batch.action.logp_old, batch.action.adv_hat, clip_, terms, c.dlogp);
   terms.entropy = GaussianMeanEntropy(sigma);
   GaussianLogProbGrad(batch.a, mu, sigma, c.dlogp, c.action.dmu, c.action.dsigma);
   if (w_a_ != 0) AddGaussianEntropyGrad(sigma, Real(-w_a_), c.action.dsigma);
@@ -292,7 +292,7 @@ LossTerms Option2Vec::ActionLoss(const Batch& batch, const FixedDraws* fixed) {
     critic_net_.ForwardAll(batch.s, c.o, W_o, critic_table_, critic);
     for (Index b = 0; b < B; ++b) c.v(b) = critic.q(c.o[std::size_t(b)], b);
   }
-  ValueLoss(c.v, batch.low.ret, terms, c.dv);
+  ValueLoss(c.v, batch.action.ret, terms, c.dv);
   critic.dq.setZero(critic.q.rows(), B);
   for (Index b = 0; b < B; ++b) critic.dq(scalar_critic_ ? 0 : c.o[std::size_t(b)], b) = c.dv(b);
   critic_net_.Backward(batch.s, c.o, W_o, critic);

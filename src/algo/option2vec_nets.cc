@@ -36,8 +36,8 @@ void BackwardNormalized(LayerNorm& norm, Linear& linear, const LayerNorm::Cache&
 
 // ---- Option policy ------------------------------------------------------------------------------
 
-OptionPolicyNet::OptionPolicyNet(const Option2VecSizes& n, const Form& form,
-                                 const Initialiser& init)
+PolicyOverOptions::PolicyOverOptions(const Option2VecSizes& n, const Form& form,
+                                     const Initialiser& init)
     : W_o("embed.W_o", n.D, n.K),
       init0("init.0", n.S, n.h_init),
       init1("init.1", n.h_init, n.K),
@@ -60,7 +60,7 @@ OptionPolicyNet::OptionPolicyNet(const Option2VecSizes& n, const Form& form,
   init.Orthogonal(logits.W.value, 1);
 }
 
-std::vector<Param*> OptionPolicyNet::Params() {
+std::vector<Param*> PolicyOverOptions::Params() {
   std::vector<Param*> params = {&W_o};
   Append(params, init0.Params());
   Append(params, init1.Params());
@@ -71,20 +71,20 @@ std::vector<Param*> OptionPolicyNet::Params() {
   return params;
 }
 
-std::vector<Param*> OptionPolicyNet::InitParams() {
+std::vector<Param*> PolicyOverOptions::InitParams() {
   std::vector<Param*> params = init0.Params();
   Append(params, init1.Params());
   return params;
 }
 
-void OptionPolicyNet::Tabulate(Tables& tables) const {
+void PolicyOverOptions::Tabulate(Tables& tables) const {
   block.attention.Project(W_o.value, tables.memory);
   if (!form_.two_tokens) query.MakeTable(W_o.value, tables.query);
 }
 
-void OptionPolicyNet::Forward(const ConstMatRef& s, std::span<const int> o_prev,
-                              std::span<const char> init, const Tables& tables,
-                              const AttentionBlock::Masks* masks, Cache& c) const {
+void PolicyOverOptions::Forward(const ConstMatRef& s, std::span<const int> o_prev,
+                                std::span<const char> init, const Tables& tables,
+                                const AttentionBlock::Masks* masks, Cache& c) const {
   const Index B = s.cols(), D = W_o.value.rows(), K = W_o.value.cols();
   c.x.resize(D, Tokens() * B);
   c.relu.resize(D, B);
@@ -126,7 +126,7 @@ void OptionPolicyNet::Forward(const ConstMatRef& s, std::span<const int> o_prev,
   LogSoftmax(c.z, c.log_P, c.P);
 }
 
-void OptionPolicyNet::BackwardInitial(Cache& c) {
+void PolicyOverOptions::BackwardInitial(Cache& c) {
   c.init_dz.resize(c.dz.rows(), c.dz.cols());
   c.init_dhidden.resize(c.init_hidden.rows(), c.dz.cols());
   const Index n = Index(c.init_rows.size());
@@ -144,8 +144,9 @@ void OptionPolicyNet::BackwardInitial(Cache& c) {
   init0.AddGrad(c.init_s.leftCols(n), dhidden);
 }
 
-void OptionPolicyNet::Backward(const ConstMatRef& s, std::span<const int> o_prev,
-                               const Tables& tables, const AttentionBlock::Masks* masks, Cache& c) {
+void PolicyOverOptions::Backward(const ConstMatRef& s, std::span<const int> o_prev,
+                                 const Tables& tables, const AttentionBlock::Masks* masks,
+                                 Cache& c) {
   const Index B = s.cols(), D = W_o.value.rows(), K = W_o.value.cols();
   BackwardInitial(c);
   c.dtokens.resize(D, Tokens() * B);

@@ -24,7 +24,7 @@ struct Option2VecSizes {
 ///   one token:   x = LN(ReLU(W [s, o_hat_{t-1}] + b)),           z = W_z t + b_z        (spec 2.7)
 ///   two tokens:  x0 = LN(ReLU(W s + b)), x1 = o_hat_{t-1},       z = W_z [t0; t1] + b_z (spec 2.6)
 ///   t = AttentionBlock(x; W_o)
-struct OptionPolicyNet {
+struct PolicyOverOptions {
   /// The switches that shape it.
   struct Form {
     bool two_tokens;       // o2v_query = released
@@ -55,8 +55,8 @@ struct OptionPolicyNet {
     Mat dtable;  // (D, K) adjoint of the table of `query`
   };
 
-  OptionPolicyNet() = default;
-  OptionPolicyNet(const Option2VecSizes& sizes, const Form& form, const Initialiser& init);
+  PolicyOverOptions() = default;
+  PolicyOverOptions(const Option2VecSizes& sizes, const Form& form, const Initialiser& init);
 
   /// What follows from the weights alone, made once while they stand.
   struct Tables {

@@ -34,15 +34,15 @@ void SortByOption(std::span<const int> o, Index K, std::vector<int>& sample,
 
 // ---- Bank ---------------------------------------------------------------------------------------
 
-OptionBank::OptionBank(const std::string& name, Index K, Index S, Index h, Index n_out,
-                       Activation activation, const Initialiser& init) {
+PerOptionMlps::PerOptionMlps(const std::string& name, Index K, Index S, Index h, Index n_out,
+                             Activation activation, const Initialiser& init) {
   for (Index k = 0; k < K; ++k) {
     nets_.emplace_back(OptionName(k, name + ".body"), OptionName(k, name + ".head"), S, h, n_out,
                        activation, init);
   }
 }
 
-void OptionBank::ForwardOne(const ConstMatRef& s, std::span<const int> o, Cache& c) const {
+void PerOptionMlps::ForwardOne(const ConstMatRef& s, std::span<const int> o, Cache& c) const {
   Check(Index(o.size()) == s.cols(), "option networks: got ", o.size(), " options for ", s.cols(),
         " samples");
   c.all = false;
@@ -54,7 +54,7 @@ void OptionBank::ForwardOne(const ConstMatRef& s, std::span<const int> o, Cache&
   for (Index i = 0; i < s.cols(); ++i) c.out.col(c.sample[std::size_t(i)]) = c.y.col(i);
 }
 
-void OptionBank::ForwardAll(const ConstMatRef& s, Cache& c) const {
+void PerOptionMlps::ForwardAll(const ConstMatRef& s, Cache& c) const {
   c.all = true;
   c.start.resize(nets_.size() + 1);
   for (Index k = 0; k <= K(); ++k) c.start[std::size_t(k)] = k * s.cols();
@@ -62,7 +62,7 @@ void OptionBank::ForwardAll(const ConstMatRef& s, Cache& c) const {
   c.out = c.y;
 }
 
-void OptionBank::Forward(const ConstMatRef& s, Cache& c) const {
+void PerOptionMlps::Forward(const ConstMatRef& s, Cache& c) const {
   const Index n = c.start.back(), h = nets_[0].head.W.value.cols();
   c.h0.resize(h, n);
   c.h1.resize(h, n);
@@ -70,14 +70,14 @@ void OptionBank::Forward(const ConstMatRef& s, Cache& c) const {
   for (std::size_t k = 0; k < nets_.size(); ++k) {
     const Index start = c.start[k], m = c.start[k + 1] - start;
     if (m == 0) continue;
-    const Net& net = nets_[k];
+    const Mlp& net = nets_[k];
     auto h1 = c.h1.middleCols(start, m);
     net.body.Forward(s.middleCols(c.all ? 0 : start, m), c.h0.middleCols(start, m), h1);
     net.head.Forward(h1, c.y.middleCols(start, m));
   }
 }
 
-void OptionBank::Backward(const ConstMatRef& s, Cache& c) {
+void PerOptionMlps::Backward(const ConstMatRef& s, Cache& c) {
   const Index n = c.start.back();
   c.dh0.resize(c.h0.rows(), n);
   c.dh1.resize(c.h1.rows(), n);
@@ -89,7 +89,7 @@ void OptionBank::Backward(const ConstMatRef& s, Cache& c) {
   for (std::size_t k = 0; k < nets_.size(); ++k) {
     const Index start = c.start[k], m = c.start[k + 1] - start;
     if (m == 0) continue;
-    Net& net = nets_[k];
+    Mlp& net = nets_[k];
     const auto dy = dy_sorted.middleCols(start, m);
     const auto h1 = c.h1.middleCols(start, m);
     auto dh1 = c.dh1.middleCols(start, m);
@@ -100,27 +100,27 @@ void OptionBank::Backward(const ConstMatRef& s, Cache& c) {
   }
 }
 
-std::vector<Param*> OptionBank::Params() {
+std::vector<Param*> PerOptionMlps::Params() {
   std::vector<Param*> params;
-  for (Net& net : nets_) Append(params, net.Params());
+  for (Mlp& net : nets_) Append(params, net.Params());
   return params;
 }
 
 // ---- Intra-option policies ----------------------------------------------------------------------
 
-OptionPolicies::OptionPolicies(Index K, Index S, Index A, Index h, Activation activation,
-                               const Initialiser& init)
+IntraOptionPolicies::IntraOptionPolicies(Index K, Index S, Index A, Index h, Activation activation,
+                                         const Initialiser& init)
     : mu_("mu", K, S, h, A, activation, init) {
   for (Index k = 0; k < K; ++k) rho_.emplace_back(OptionName(k, "rho"), A, 1);
 }
 
-void OptionPolicies::MakeSigma(Cache& c) const {
+void IntraOptionPolicies::MakeSigma(Cache& c) const {
   c.sigma_of.resize(rho_[0].value.rows(), Index(rho_.size()));
   for (std::size_t k = 0; k < rho_.size(); ++k) c.sigma_of.col(Index(k)) = rho_[k].value.col(0);
   Softplus(c.sigma_of);
 }
 
-void OptionPolicies::ForwardOne(const ConstMatRef& s, std::span<const int> o, Cache& c) const {
+void IntraOptionPolicies::ForwardOne(const ConstMatRef& s, std::span<const int> o, Cache& c) const {
   mu_.ForwardOne(s, o, c.nets);
   Tanh(c.nets.out);
   MakeSigma(c);
@@ -128,7 +128,7 @@ void OptionPolicies::ForwardOne(const ConstMatRef& s, std::span<const int> o, Ca
   GatherColumns(c.sigma_of, o, c.sigma);
 }
 
-void OptionPolicies::ForwardAll(const ConstMatRef& s, Cache& c) const {
+void IntraOptionPolicies::ForwardAll(const ConstMatRef& s, Cache& c) const {
   mu_.ForwardAll(s, c.nets);
   Tanh(c.nets.out);
   MakeSigma(c);
@@ -138,7 +138,7 @@ void OptionPolicies::ForwardAll(const ConstMatRef& s, Cache& c) const {
   }
 }
 
-void OptionPolicies::Backward(const ConstMatRef& s, std::span<const int> o, Cache& c) {
+void IntraOptionPolicies::Backward(const ConstMatRef& s, std::span<const int> o, Cache& c) {
   ActivationBackward(Activation::kTanh, c.nets.out, c.nets.dout);
   mu_.Backward(s, c.nets);
   c.dsigma_of.setZero(c.sigma_of.rows(), c.sigma_of.cols());
@@ -153,7 +153,7 @@ void OptionPolicies::Backward(const ConstMatRef& s, std::span<const int> o, Cach
   for (std::size_t k = 0; k < rho_.size(); ++k) rho_[k].grad.col(0) += c.dsigma_of.col(Index(k));
 }
 
-std::vector<Param*> OptionPolicies::Params(Index k) {
+std::vector<Param*> IntraOptionPolicies::Params(Index k) {
   std::vector<Param*> params = mu_[k].Params();
   params.push_back(&rho_[std::size_t(k)]);
   return params;
@@ -165,11 +165,11 @@ OptionNets::OptionNets(Index K, Index S, Index A, Index h, Activation activation
                        const Initialiser& init)
     : master("master.body", "master.head", S, h, K, activation, init) {
   const bool q = head == CriticHead::kQ;
-  critic = Net("critic.body", q ? "critic.q" : "critic.u", S, h, q ? K : K + 1, activation, init);
+  critic = Mlp("critic.body", q ? "critic.q" : "critic.u", S, h, q ? K : K + 1, activation, init);
   idle_head = Linear(q ? "critic.u" : "critic.q", h, q ? K + 1 : K);
   init.Orthogonal(idle_head.W.value, kHeadGain);
-  policy = OptionPolicies(K, S, A, h, activation, init);
-  beta = OptionBank("beta", K, S, h, 1, activation, init);
+  policy = IntraOptionPolicies(K, S, A, h, activation, init);
+  beta = PerOptionMlps("beta", K, S, h, 1, activation, init);
 }
 
 void OptionNets::Beta(const ConstMatRef& s, std::span<const int> o, bool all, BetaCache& c) const {
@@ -198,14 +198,14 @@ void OptionNets::BackwardBeta(const ConstMatRef& s, std::span<const int> o, Beta
   beta.Backward(s, c.nets);
 }
 
-void OptionNets::Master(const ConstMatRef& s, Process& c) const {
+void OptionNets::Master(const ConstMatRef& s, CallAndReturnCache& c) const {
   master.Forward(s, c.master);
   LogSoftmax(c.master.out, c.log_pi, c.pi);
 }
 
 void OptionNets::CallAndReturn(const ConstMatRef& s, std::span<const int> o_prev,
                                std::span<const char> init, const Mat& pi, Fidelity beta_index,
-                               Process& c) const {
+                               CallAndReturnCache& c) const {
   Beta(s, o_prev, beta_index == Fidelity::kReleased, c.beta);
   c.M.resize(pi.rows(), pi.cols());
   OneHot(o_prev, c.M);

@@ -12,7 +12,7 @@ namespace o2v {
 
 /// K networks of one shape, one an option. A batch passes each sample through the network of one
 /// option, at the cost of a single network, or through all K.
-class OptionBank {
+class PerOptionMlps {
  public:
   struct Cache {
     Mat out, dout;  // (n_out, n), n = B: column b of option o_b; or n = K B: column k B + b of
@@ -25,10 +25,10 @@ class OptionBank {
     Mat y, dy;                 // (n_out, n) out and dout, sorted
   };
 
-  OptionBank() = default;
+  PerOptionMlps() = default;
   /// Networks named option<k>.`name`.body and option<k>.`name`.head.
-  OptionBank(const std::string& name, Index K, Index S, Index h, Index n_out, Activation activation,
-             const Initialiser& init);
+  PerOptionMlps(const std::string& name, Index K, Index S, Index h, Index n_out,
+                Activation activation, const Initialiser& init);
 
   /// s (S, B), o (B) -> cache.out (n_out, B).
   void ForwardOne(const ConstMatRef& s, std::span<const int> o, Cache& cache) const;
@@ -38,29 +38,29 @@ class OptionBank {
   void Backward(const ConstMatRef& s, Cache& cache);
 
   Index K() const { return Index(nets_.size()); }
-  Net& operator[](Index k) { return nets_[std::size_t(k)]; }
+  Mlp& operator[](Index k) { return nets_[std::size_t(k)]; }
   /// Option after option.
   std::vector<Param*> Params();
 
  private:
   void Forward(const ConstMatRef& s, Cache& cache) const;
 
-  std::vector<Net> nets_;
+  std::vector<Mlp> nets_;
 };
 
 /// Intra-option policies pi_k(a | s) = N(mu_k(s), sigma_k^2): mu_k = tanh(.), sigma_k =
 /// softplus(rho_k) free of the state. Source: spec 2.3.
-class OptionPolicies {
+class IntraOptionPolicies {
  public:
   struct Cache {
-    OptionBank::Cache nets;   // nets.out is mu after its tanh, nets.dout its adjoint
-    Mat sigma, dsigma;        // (A, n), column by column as nets.out
-    Mat sigma_of, dsigma_of;  // (A, K) sigma_k of every option; its adjoint
+    PerOptionMlps::Cache nets;  // nets.out is mu after its tanh, nets.dout its adjoint
+    Mat sigma, dsigma;          // (A, n), column by column as nets.out
+    Mat sigma_of, dsigma_of;    // (A, K) sigma_k of every option; its adjoint
   };
 
-  OptionPolicies() = default;
-  OptionPolicies(Index K, Index S, Index A, Index h, Activation activation,
-                 const Initialiser& init);
+  IntraOptionPolicies() = default;
+  IntraOptionPolicies(Index K, Index S, Index A, Index h, Activation activation,
+                      const Initialiser& init);
 
   /// s (S, B), o (B) -> mu, sigma (A, B) of the options o.
   void ForwardOne(const ConstMatRef& s, std::span<const int> o, Cache& cache) const;
@@ -76,7 +76,7 @@ class OptionPolicies {
  private:
   void MakeSigma(Cache& cache) const;
 
-  OptionBank mu_;
+  PerOptionMlps mu_;
   std::vector<Param> rho_;  // (A, 1) each
 };
 
@@ -86,10 +86,10 @@ class OptionPolicies {
 struct OptionNets {
   enum class CriticHead { kQ, kU };
 
-  Net master, critic;
+  Mlp master, critic;
   Linear idle_head;  // the critic's head that the method does not use
-  OptionPolicies policy;
-  OptionBank beta;  // logits b_k of the terminations
+  IntraOptionPolicies policy;
+  PerOptionMlps beta;  // logits b_k of the terminations
 
   OptionNets() = default;
   OptionNets(Index K, Index S, Index A, Index h, Activation activation, CriticHead head,
@@ -97,7 +97,7 @@ struct OptionNets {
 
   /// Terminations, beta_k = sigmoid(b_k).
   struct BetaCache {
-    OptionBank::Cache nets;
+    PerOptionMlps::Cache nets;
     Mat beta, db;  // (K, B); db, the adjoint of the logits, is the input of BackwardBeta
   };
   /// s (S, B) -> c.beta: of all options, or with `all` = false of option o_b alone, the rest 0.
@@ -107,18 +107,18 @@ struct OptionNets {
 
   /// The call-and-return process at B states: a master policy pi(. | s) chooses when option o' has
   /// terminated.
-  struct Process {
-    Net::Cache master;  // out is the logits z
+  struct CallAndReturnCache {
+    Mlp::Cache master;  // out is the logits z
     BetaCache beta;     // of o', or of all options
     Mat log_pi, pi;     // (K, B)
     Mat M, pi_hat;      // (K, B) onehot(o'), the mixture of both
   };
   /// s (S, B) -> c.pi, c.log_pi.
-  void Master(const ConstMatRef& s, Process& c) const;
+  void Master(const ConstMatRef& s, CallAndReturnCache& c) const;
   /// s (S, B), o_prev, init (B) -> c.pi_hat of spec 3.5, the mixture with pi (K, B): c.pi, or what
   /// chooses in place of the master policy.
   void CallAndReturn(const ConstMatRef& s, std::span<const int> o_prev, std::span<const char> init,
-                     const Mat& pi, Fidelity beta_index, Process& c) const;
+                     const Mat& pi, Fidelity beta_index, CallAndReturnCache& c) const;
 
   /// All in the order of the network; those without the idle head.
   std::vector<Param*> Params();

@@ -25,7 +25,7 @@ class Ppo final : public PpoMethod {
   void Values(const Choices& x, Index row) override;
 
   struct Cache {
-    Net::Cache actor, critic;  // the actor's output is mu (A, B)
+    Mlp::Cache actor, critic;  // the actor's output is mu (A, B)
     Mat dsigma;                // (A, 1)
     Vec logp, dlogp, values;   // (B)
   };
@@ -36,7 +36,7 @@ class Ppo final : public PpoMethod {
 
   const double clip_;            // c
   const double entropy_weight_;  // w
-  Net actor_, critic_net_;
+  Mlp actor_, critic_net_;
   Param rho_;  // (A, 1)
   Mat sigma_;  // (A, 1)
   CacheByWidth<Cache> caches_;
@@ -49,8 +49,8 @@ Ppo::Ppo(const AlgorithmInput& in)
       rho_("actor.rho", in.A, 1) {
   const Index h = in.hyper->Int("hidden", 1);
   const Activation g = ReadActivation(*in.hyper);
-  actor_ = Net("actor.body", "actor.head", in.S, h, in.A, g, init_);
-  critic_net_ = Net("critic.body", "critic.v", in.S, h, 1, g, init_);
+  actor_ = Mlp("actor.body", "actor.head", in.S, h, in.A, g, init_);
+  critic_net_ = Mlp("critic.body", "critic.v", in.S, h, 1, g, init_);
   std::vector<Param*> params = actor_.Params();
   params.push_back(&rho_);
   Append(params, critic_net_.Params());
@@ -73,11 +73,11 @@ void Ppo::Act(const Mat& s, std::span<const char>, Index row) {
   Actor(s, c);
   SampleGaussian(c.actor.out, sigma_, policy_rng_, a_);
   GaussianLogProb(a_, c.actor.out, sigma_, c.logp);
-  rollout_.batch.low.logp_old.segment(row, N_) = c.logp;
+  rollout_.batch.action.logp_old.segment(row, N_) = c.logp;
 }
 
 void Ppo::Values(const Choices& x, Index row) {
-  Net::Cache& critic = caches_(x.s.cols()).critic;
+  Mlp::Cache& critic = caches_(x.s.cols()).critic;
   critic_net_.Forward(x.s, critic);
   Eigen::Map<VecD>(rollout_.critics[0].v.data() + row, x.s.cols()) =
       critic.out.row(0).transpose().cast<double>();
@@ -90,7 +90,7 @@ LossTerms Ppo::Loss(int, const Batch& batch, const FixedDraws*) {
   Actor(batch.s, c);
   const Mat& mu = c.actor.out;
   GaussianLogProb(batch.a, mu, sigma_, c.logp);
-  ClippedSurrogate(c.logp, batch.low.logp_old, batch.low.adv_hat, clip_, terms, c.dlogp);
+  ClippedSurrogate(c.logp, batch.action.logp_old, batch.action.adv_hat, clip_, terms, c.dlogp);
   terms.entropy = GaussianMeanEntropy(sigma_);
 
   GaussianLogProbGrad(batch.a, mu, sigma_, c.dlogp, c.actor.dout, c.dsigma);
@@ -102,7 +102,7 @@ LossTerms Ppo::Loss(int, const Batch& batch, const FixedDraws*) {
 
   critic_net_.Forward(batch.s, c.critic);
   c.values = c.critic.out.row(0).transpose();
-  ValueLoss(c.values, batch.low.ret, terms, c.dlogp);
+  ValueLoss(c.values, batch.action.ret, terms, c.dlogp);
   c.critic.dout = c.dlogp.transpose();
   critic_net_.Backward(batch.s, c.critic);
 

@@ -30,7 +30,7 @@ void PpoMethod::Collect(VecEnv& env, std::vector<Episode>& episodes) {
   BeforeRollout();
   for (int t = 0; t < T_; ++t) {
     const Index row = Index(t) * N_;
-    Act(env.States(), env.Init(), row);
+    Act(env.States(), env.EpisodeStarts(), row);
     batch.s.middleCols(row, N_) = env.States();
     batch.a.middleCols(row, N_) = a_;
     env.Step(a_, transition_, episodes);
@@ -45,7 +45,7 @@ void PpoMethod::Collect(VecEnv& env, std::vector<Episode>& episodes) {
             Rows(batch.o, row, n), batch.P_old.middleCols(row, n)},
            row);
   }
-  Values(Imagine(env.States(), env.Init()), batch.Size());
+  Values(Imagine(env.States(), env.EpisodeStarts()), batch.Size());
   rollout_.MakeTargets(gamma_, lambda_, adv_std_eps_);
   AfterRollout();
 }
@@ -64,7 +64,7 @@ void PpoMethod::LearnStage(int stage) {
   }
 }
 
-const std::vector<Ratio>& PpoMethod::Update() {
+const std::vector<SumAndCount>& PpoMethod::Update() {
   if (order_rng_) {
     const int first = order_rng_->Uniform() < 0.5 ? 0 : 1;  // a fair coin; spec 4.6 (f), 4.8 (f)
     LearnStage(first);

@@ -23,7 +23,7 @@ struct Choices {
 class PpoMethod : public Method {
  public:
   void Collect(VecEnv& env, std::vector<Episode>& episodes) final;
-  const std::vector<Ratio>& Update() final;
+  const std::vector<SumAndCount>& Update() final;
 
  protected:
   /// Reads gamma, lambda, rollout, epochs and minibatch. Each stage has advantages and targets of

@@ -33,7 +33,7 @@ class Ppoc final : public PpoMethod {
   void Values(const Choices& x, Index row) override;
 
   struct Cache {
-    OptionNets::Process options;
+    OptionNets::CallAndReturnCache options;
     OptionNets::BetaCache beta_taken;  // of o
     ActionCache action;
     ValueCache value;       // value.critic.out is q (K, B)
@@ -69,7 +69,7 @@ Ppoc::Ppoc(const AlgorithmInput& in)
 
 const Mat& Ppoc::PiHat(const ConstMatRef& s, std::span<const int> o_prev,
                        std::span<const char> init) {
-  OptionNets::Process& c = caches_(s.cols()).options;
+  OptionNets::CallAndReturnCache& c = caches_(s.cols()).options;
   nets_.Master(s, c);
   nets_.CallAndReturn(s, o_prev, init, c.pi, switches_.beta_index, c);
   return c.pi_hat;
@@ -81,7 +81,7 @@ void Ppoc::Act(const Mat& s, std::span<const char> init, Index row) {
   SampleCategorical(PiHat(s, o_prev_, init), policy_rng_, c.o);
   SampleAction(nets_.policy, s, c.o, policy_rng_, a_, c.action);
   LogDensity(switches_.density_log_eps, c.action.logp, c.action.slope);
-  rollout_.batch.low.logp_old.segment(row, N_) = c.action.logp;
+  rollout_.batch.action.logp_old.segment(row, N_) = c.action.logp;
   RecordOptions(row, c.o, init, rollout_.batch);
 }
 
@@ -105,7 +105,7 @@ LossTerms Ppoc::Loss(int, const Batch& batch, const FixedDraws*) {
   Cache& c = caches_(batch.Size());
   ActionLogProb(nets_.policy, batch, c.action);
   ActionSurrogate(nets_.policy, batch, switches_.density_log_eps, clip_, terms, c.action);
-  EntryValueLoss(nets_.critic, batch.s, batch.o, batch.low.ret, terms, c.value);
+  EntryValueLoss(nets_.critic, batch.s, batch.o, batch.action.ret, terms, c.value);
   nets_.Master(batch.s, c.options);
   TerminationLoss(batch, terms, c);
   MasterLoss(batch, terms, c);
@@ -141,7 +141,7 @@ void Ppoc::MasterLoss(const Batch& batch, LossTerms& terms, Cache& c) {
   const Mat &pi = c.options.pi, &log_pi = c.options.log_pi;
   Mat& dz = c.options.master.dout;
   MasterWeight(batch, c);
-  c.dlog_pi = -scale * c.omega.cwiseProduct(batch.low.adv_hat);
+  c.dlog_pi = -scale * c.omega.cwiseProduct(batch.action.adv_hat);
   for (Index b = 0; b < B; ++b) {
     terms.master += double(c.dlog_pi(b) * log_pi(batch.o[std::size_t(b)], b));
   }

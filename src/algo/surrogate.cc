@@ -42,35 +42,35 @@ void ValueLoss(const Vec& v, const Vec& ret, LossTerms& terms, Vec& dv) {
 
 // ---- With one network an option -----------------------------------------------------------------
 
-void SampleAction(const OptionPolicies& policy, const ConstMatRef& s, std::span<const int> o,
+void SampleAction(const IntraOptionPolicies& policy, const ConstMatRef& s, std::span<const int> o,
                   Rng& rng, Mat& a, ActionCache& c) {
   policy.ForwardOne(s, o, c.policy);
   SampleGaussian(c.policy.nets.out, c.policy.sigma, rng, a);
   GaussianLogProb(a, c.policy.nets.out, c.policy.sigma, c.logp);
 }
 
-void ActionLogProb(const OptionPolicies& policy, const Batch& batch, ActionCache& c) {
+void ActionLogProb(const IntraOptionPolicies& policy, const Batch& batch, ActionCache& c) {
   policy.ForwardOne(batch.s, batch.o, c.policy);
   GaussianLogProb(batch.a, c.policy.nets.out, c.policy.sigma, c.logp);
 }
 
-void ActionSurrogate(OptionPolicies& policy, const Batch& batch, Fidelity density_log_eps,
+void ActionSurrogate(IntraOptionPolicies& policy, const Batch& batch, Fidelity density_log_eps,
                      double clip, LossTerms& terms, ActionCache& c) {
   LogDensity(density_log_eps, c.logp, c.slope);
-  ClippedSurrogate(c.logp, batch.low.logp_old, batch.low.adv_hat, clip, terms, c.dlogp);
+  ClippedSurrogate(c.logp, batch.action.logp_old, batch.action.adv_hat, clip, terms, c.dlogp);
   c.dlogp.array() *= c.slope.array();
   GaussianLogProbGrad(batch.a, c.policy.nets.out, c.policy.sigma, c.dlogp, c.policy.nets.dout,
                       c.policy.dsigma);
   policy.Backward(batch.s, batch.o, c.policy);
 }
 
-void EntryValues(const Net& critic, const ConstMatRef& s, std::span<const int> k, Net::Cache& c,
+void EntryValues(const Mlp& critic, const ConstMatRef& s, std::span<const int> k, Mlp::Cache& c,
                  double* v) {
   critic.Forward(s, c);
   for (Index b = 0; b < s.cols(); ++b) v[b] = double(c.out(k[std::size_t(b)], b));
 }
 
-void EntryValueLoss(Net& critic, const ConstMatRef& s, std::span<const int> k, const Vec& ret,
+void EntryValueLoss(Mlp& critic, const ConstMatRef& s, std::span<const int> k, const Vec& ret,
                     LossTerms& terms, ValueCache& c) {
   const Index B = s.cols();
   critic.Forward(s, c.critic);
@@ -114,7 +114,7 @@ void LossMeans::Add(const LossTerms& terms, double grad_norm) {
   ++n_;
 }
 
-void LossMeans::Report(std::vector<Ratio>& ratios) const {
+void LossMeans::Report(std::vector<SumAndCount>& ratios) const {
   for (const double sum : sums_) ratios.push_back({sum, double(n_)});
   ratios.push_back({grad_norm_, double(n_)});
 }

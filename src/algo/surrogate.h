@@ -26,35 +26,35 @@ void ValueLoss(const Vec& v, const Vec& ret, LossTerms& terms, Vec& dv);
 
 /// What acting by options o, or a loss on it, leaves behind.
 struct ActionCache {
-  OptionPolicies::Cache policy;
+  IntraOptionPolicies::Cache policy;
   Vec logp, dlogp, slope;  // (B) ln pi_o(a | s), its adjoint, its slope under density_log_eps
 };
 
 /// s (S, N), o (N) -> a (A, N) ~ pi_o and c.logp.
-void SampleAction(const OptionPolicies& policy, const ConstMatRef& s, std::span<const int> o,
+void SampleAction(const IntraOptionPolicies& policy, const ConstMatRef& s, std::span<const int> o,
                   Rng& rng, Mat& a, ActionCache& c);
 
 /// c.logp of a batch.
-void ActionLogProb(const OptionPolicies& policy, const Batch& batch, ActionCache& c);
+void ActionLogProb(const IntraOptionPolicies& policy, const Batch& batch, ActionCache& c);
 
-/// Clipped surrogate of the density e^{c.logp} on batch.low under density_log_eps. c.logp is what
-/// ActionLogProb left, with the logarithms of other factors added or not; c.dlogp becomes its
+/// Clipped surrogate of the density e^{c.logp} on batch.action under density_log_eps. c.logp is
+/// what ActionLogProb left, with the logarithms of other factors added or not; c.dlogp becomes its
 /// adjoint. Adds to the gradients of the policies.
-void ActionSurrogate(OptionPolicies& policy, const Batch& batch, Fidelity density_log_eps,
+void ActionSurrogate(IntraOptionPolicies& policy, const Batch& batch, Fidelity density_log_eps,
                      double clip, LossTerms& terms, ActionCache& c);
 
 /// v[b] = x_k of the critic's outputs x at s (S, B), k (B).
-void EntryValues(const Net& critic, const ConstMatRef& s, std::span<const int> k, Net::Cache& c,
+void EntryValues(const Mlp& critic, const ConstMatRef& s, std::span<const int> k, Mlp::Cache& c,
                  double* v);
 
 /// What a value loss leaves behind.
 struct ValueCache {
-  Net::Cache critic;
+  Mlp::Cache critic;
   Vec v, dv;  // (B)
 };
 
 /// 1/2 mean (x_k - ret)^2 of the critic's outputs x at s (S, B), k (B). Adds to the gradients.
-void EntryValueLoss(Net& critic, const ConstMatRef& s, std::span<const int> k, const Vec& ret,
+void EntryValueLoss(Mlp& critic, const ConstMatRef& s, std::span<const int> k, const Vec& ret,
                     LossTerms& terms, ValueCache& c);
 
 // ---- Statistics ---------------------------------------------------------------------------------
@@ -71,7 +71,7 @@ class LossMeans {
   void Add(const LossTerms& terms, double grad_norm);
   /// Appends total, surrogate, value, entropy, kl, clip_fraction, the other columns and grad_norm,
   /// in the order of Names.
-  void Report(std::vector<Ratio>& ratios) const;
+  void Report(std::vector<SumAndCount>& ratios) const;
   /// The columns of `stage`.
   static void Names(const std::string& stage, std::vector<std::string>& names,
                     const LossColumns& more = {});

@@ -16,10 +16,10 @@ void TwoStageMethod::Act(const Mat& s, std::span<const char> init, Index row) {
   SampleCategorical(options.P, policy_rng_, o_);
   batch.P_old.middleCols(row, N_) = options.P;
   for (Index i = 0; i < N_; ++i) {
-    batch.high.logp_old(row + i) = options.log_P(o_[std::size_t(i)], i);
+    batch.option.logp_old(row + i) = options.log_P(o_[std::size_t(i)], i);
   }
   DrawActions(s, o_, a_, logp_);
-  batch.low.logp_old.segment(row, N_) = logp_;
+  batch.action.logp_old.segment(row, N_) = logp_;
   RecordOptions(row, o_, init, batch);
 }
 

@@ -28,7 +28,7 @@ double Rng::Normal() {
   return std::sqrt(-2 * std::log(u)) * std::cos(2 * std::numbers::pi * v);
 }
 
-std::uint64_t Rng::Below(std::uint64_t n) {
+std::uint64_t Rng::UniformInt(std::uint64_t n) {
   __extension__ using Wide = unsigned __int128;
   const std::uint64_t threshold = -n % n;  // 2^64 mod n
   for (;;) {
@@ -39,7 +39,7 @@ std::uint64_t Rng::Below(std::uint64_t n) {
   }
 }
 
-void Rng::Visit(StateVisitor& v, std::string_view name) {
+void Rng::Serialize(StateVisitor& v, std::string_view name) {
   std::array<std::int64_t, kEngineWords> words{};
   std::stringstream text;
   text << engine_;

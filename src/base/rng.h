@@ -26,10 +26,10 @@ class Rng {
   /// Standard normal (Box-Muller, cosine branch only: the engine is the whole state).
   double Normal();
   /// Uniform in {0, ..., n-1}; n > 0. Lemire's multiply-shift with rejection: unbiased.
-  std::uint64_t Below(std::uint64_t n);
+  std::uint64_t UniformInt(std::uint64_t n);
 
   /// The engine's 312 words and position under `name`.
-  void Visit(StateVisitor& v, std::string_view name);
+  void Serialize(StateVisitor& v, std::string_view name);
 
  private:
   std::mt19937_64 engine_;

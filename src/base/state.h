@@ -1,5 +1,5 @@
 #pragma once
-// How a resumable object shows its state: one Visit function serves saving and loading.
+// How a resumable object shows its state: one Serialize function serves saving and loading.
 
 #include <cstdint>
 #include <limits>

@@ -58,7 +58,7 @@ Interval BootstrapInterval(std::span<const double> x, std::uint64_t seed) {
   std::vector<double> means(kResamples);
   for (double& mean : means) {
     double sum = 0;
-    for (std::size_t i = 0; i < x.size(); ++i) sum += x[rng.Below(x.size())];
+    for (std::size_t i = 0; i < x.size(); ++i) sum += x[rng.UniformInt(x.size())];
     mean = sum / static_cast<double>(x.size());
   }
   std::sort(means.begin(), means.end());

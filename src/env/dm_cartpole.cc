@@ -17,7 +17,7 @@ class Cartpole : public DmEnv {
   double Cos() const { return Xmat(pole_, 2, 2); }
 
  private:
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
+  void DrawStart(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
     AddUniform(rng, 0.1, qpos.first(1));
     AddUniform(rng, 0.034, qpos.last(1));
     AddNormal(rng, 0.01, qvel);

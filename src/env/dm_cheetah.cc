@@ -16,7 +16,7 @@ class Cheetah final : public DmEnv {
       : DmEnv({id, "dm_cheetah", /*frame_skip=*/1, /*S=*/17}, time_limit), direction_(direction) {}
 
  private:
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double>) override {
+  void DrawStart(Rng& rng, std::span<double> qpos, std::span<double>) override {
     DrawLimitedJoints(rng, qpos);
     for (int i = 0; i < 200; ++i) mj_step(&model(), &data());
   }

@@ -24,7 +24,7 @@ void DmEnv::DrawUnlimitedHinges(Rng& rng, std::span<double> qpos) const {
 
 // Deriving normalises quaternions in qpos, and twice is not once in the last bit: what a resumed
 // run derives its state from again is kept.
-void DmEnv::Derive() {
+void DmEnv::ComputeDerived() {
   std::ranges::copy(qpos(), q_.begin());
   mj_forward(&model(), &data());
 }
@@ -44,9 +44,9 @@ void DmEnv::Simulate() {
 
 // A loaded state lacks what mj_step2 reads; when saving, mj_step1 finds again what is there. It
 // does not touch qacc_warmstart.
-void DmEnv::Visit(StateVisitor& v, const std::string& prefix) {
+void DmEnv::Serialize(StateVisitor& v, const std::string& prefix) {
   std::ranges::copy(q_, data().qpos);
-  MujocoEnv::Visit(v, prefix);
+  MujocoEnv::Serialize(v, prefix);
   std::ranges::copy(qpos(), q_.begin());
   mj_step1(&model(), &data());
 }

@@ -14,7 +14,7 @@ namespace o2v {
 /// Source: spec E.3.
 class DmEnv : public MujocoEnv {
  public:
-  void Visit(StateVisitor& v, const std::string& prefix) final;
+  void Serialize(StateVisitor& v, const std::string& prefix) final;
 
  protected:
   /// Contact forces are none of these tasks' quantities: never computed.
@@ -35,9 +35,11 @@ class DmEnv : public MujocoEnv {
   }
 
  private:
-  void Derive() final;
+  void ComputeDerived() final;
   void Simulate() final;
-  Outcome Judge(double, double, std::span<const double> a) const final { return {Reward(a)}; }
+  Outcome RewardAndEnd(double, double, std::span<const double> a) const final {
+    return {Reward(a)};
+  }
 
   std::vector<double> q_;  // qpos that the current state's derived quantities were computed from
 };

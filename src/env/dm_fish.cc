@@ -17,7 +17,7 @@ class Fish final : public DmEnv {
  private:
   // qpos: the root's position (3) and quaternion (4), then the joints. The forward call that
   // follows normalises the quaternion, and of N^4 makes a uniform one.
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double>) override {
+  void DrawStart(Rng& rng, std::span<double> qpos, std::span<double>) override {
     for (double& q : qpos.subspan(3, 4)) q = rng.Normal();
     AddUniform(rng, 0.2, qpos.subspan(7));
   }

@@ -24,7 +24,7 @@ class Reacher final : public DmEnv {
   std::span<double> Target() override { return {model().geom_pos + 3 * target_, 2}; }
 
  private:
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double>) override {
+  void DrawStart(Rng& rng, std::span<double> qpos, std::span<double>) override {
     DrawUnlimitedHinges(rng, qpos);
     DrawLimitedJoints(rng, qpos);
     const double angle = rng.Uniform(0, 2 * std::numbers::pi), radius = rng.Uniform(0.05, 0.2);

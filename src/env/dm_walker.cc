@@ -20,7 +20,7 @@ class Walker final : public DmEnv {
         direction_(direction) {}
 
  private:
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double>) override {
+  void DrawStart(Rng& rng, std::span<double> qpos, std::span<double>) override {
     DrawLimitedJoints(rng, qpos);
     DrawUnlimitedHinges(rng, qpos);
   }

@@ -45,7 +45,7 @@ class Env {
   virtual StepResult Step(std::span<const double> a, std::span<double> obs) = 0;
 
   /// All state that the next step depends on, the steps of the running episode included.
-  virtual void Visit(StateVisitor& v, const std::string& prefix) = 0;
+  virtual void Serialize(StateVisitor& v, const std::string& prefix) = 0;
 };
 
 /// A registry line.

@@ -16,14 +16,14 @@ class Ant final : public MujocoEnv {
       : MujocoEnv({"Ant-v2", "gym_ant", /*frame_skip=*/5, /*S=*/111}, options, time_limit) {}
 
  private:
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
+  void DrawStart(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
     AddUniform(rng, 0.1, qpos);
     AddNormal(rng, 0.1, qvel);
   }
 
-  double Gauge() const override { return data().xpos[3 * torso_]; }
+  double RewardQuantity() const override { return data().xpos[3 * torso_]; }
 
-  Outcome Judge(double before, double after, std::span<const double> a) const override {
+  Outcome RewardAndEnd(double before, double after, std::span<const double> a) const override {
     double contact = 0;
     for (double force : cfrc_ext()) {
       const double clipped = std::clamp(force, -1.0, 1.0);

@@ -17,14 +17,14 @@ class Hopper final : public MujocoEnv {
       : MujocoEnv({"Hopper-v2", "gym_hopper", /*frame_skip=*/4, /*S=*/11}, options, time_limit) {}
 
  private:
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
+  void DrawStart(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
     AddUniform(rng, 0.005, qpos);
     AddUniform(rng, 0.005, qvel);
   }
 
-  double Gauge() const override { return qpos()[0]; }
+  double RewardQuantity() const override { return qpos()[0]; }
 
-  Outcome Judge(double before, double after, std::span<const double> a) const override {
+  Outcome RewardAndEnd(double before, double after, std::span<const double> a) const override {
     return {(after - before) / dt() + 1 - 1e-3 * SquaredNorm(a), !Healthy()};
   }
 

@@ -13,7 +13,7 @@ class Humanoid final : public HumanoidBody {
 
  private:
   // x of the centre of mass [m].
-  double Gauge() const override {
+  double RewardQuantity() const override {
     double mass = 0, moment = 0;
     for (int body = 0; body < model().nbody; ++body) {
       mass += model().body_mass[body];
@@ -22,7 +22,7 @@ class Humanoid final : public HumanoidBody {
     return moment / mass;
   }
 
-  Outcome Judge(double before, double after, std::span<const double> a) const override {
+  Outcome RewardAndEnd(double before, double after, std::span<const double> a) const override {
     const double height = qpos()[2];
     return {1.25 * (after - before) / dt() + 5 - Cost(a), height < 1.0 || height > 2.0};
   }

@@ -23,7 +23,7 @@ class HumanoidBody : public MujocoEnv {
   }
 
  private:
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) final {
+  void DrawStart(Rng& rng, std::span<double> qpos, std::span<double> qvel) final {
     AddUniform(rng, 0.01, qpos);
     AddUniform(rng, 0.01, qvel);
   }

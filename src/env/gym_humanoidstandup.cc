@@ -13,7 +13,7 @@ class HumanoidStandup final : public HumanoidBody {
       : HumanoidBody("HumanoidStandup-v2", "gym_humanoidstandup", options, time_limit) {}
 
  private:
-  Outcome Judge(double, double, std::span<const double> a) const override {
+  Outcome RewardAndEnd(double, double, std::span<const double> a) const override {
     return {qpos()[2] / model().opt.timestep + 1 - Cost(a)};
   }
 };

@@ -20,12 +20,12 @@ class InvertedDoublePendulum final : public MujocoEnv {
                   options, time_limit) {}
 
  private:
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
+  void DrawStart(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
     AddUniform(rng, 0.1, qpos);
     AddNormal(rng, 0.1, qvel);
   }
 
-  Outcome Judge(double, double, std::span<const double>) const override {
+  Outcome RewardAndEnd(double, double, std::span<const double>) const override {
     const double x = data().site_xpos[3 * tip_], z = data().site_xpos[3 * tip_ + 2];
     const double w1 = qvel()[1], w2 = qvel()[2];
     const double off_target = 0.01 * x * x + (z - 2) * (z - 2);

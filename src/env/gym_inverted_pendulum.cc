@@ -17,12 +17,12 @@ class InvertedPendulum final : public MujocoEnv {
                   options, time_limit) {}
 
  private:
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
+  void DrawStart(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
     AddUniform(rng, 0.01, qpos);
     AddUniform(rng, 0.01, qvel);
   }
 
-  Outcome Judge(double, double, std::span<const double>) const override {
+  Outcome RewardAndEnd(double, double, std::span<const double>) const override {
     return {1, std::abs(qpos()[1]) > 0.2};
   }
 

@@ -19,7 +19,7 @@ class Reacher final : public MujocoEnv {
       : MujocoEnv({"Reacher-v2", "gym_reacher", /*frame_skip=*/2, /*S=*/11}, options, time_limit) {}
 
  private:
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
+  void DrawStart(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
     AddUniform(rng, 0.1, qpos);
     const std::span<double> goal = qpos.last(2);
     do {
@@ -33,9 +33,9 @@ class Reacher final : public MujocoEnv {
   // fingertip - target, coordinate i [m].
   double Gap(int i) const { return data().xpos[3 * fingertip_ + i] - data().xpos[3 * target_ + i]; }
 
-  double Gauge() const override { return std::hypot(Gap(0), Gap(1), Gap(2)); }
+  double RewardQuantity() const override { return std::hypot(Gap(0), Gap(1), Gap(2)); }
 
-  Outcome Judge(double before, double, std::span<const double> a) const override {
+  Outcome RewardAndEnd(double before, double, std::span<const double> a) const override {
     return {-before - SquaredNorm(a)};
   }
 

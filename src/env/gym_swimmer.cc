@@ -14,14 +14,14 @@ class Swimmer final : public MujocoEnv {
       : MujocoEnv({"Swimmer-v2", "gym_swimmer", /*frame_skip=*/4, /*S=*/8}, options, time_limit) {}
 
  private:
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
+  void DrawStart(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
     AddUniform(rng, 0.1, qpos);
     AddUniform(rng, 0.1, qvel);
   }
 
-  double Gauge() const override { return qpos()[0]; }
+  double RewardQuantity() const override { return qpos()[0]; }
 
-  Outcome Judge(double before, double after, std::span<const double> a) const override {
+  Outcome RewardAndEnd(double before, double after, std::span<const double> a) const override {
     return {(after - before) / dt() - 1e-4 * SquaredNorm(a)};
   }
 

@@ -14,14 +14,14 @@ class Walker2d final : public MujocoEnv {
                   time_limit) {}
 
  private:
-  void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
+  void DrawStart(Rng& rng, std::span<double> qpos, std::span<double> qvel) override {
     AddUniform(rng, 0.005, qpos);
     AddUniform(rng, 0.005, qvel);
   }
 
-  double Gauge() const override { return qpos()[0]; }
+  double RewardQuantity() const override { return qpos()[0]; }
 
-  Outcome Judge(double before, double after, std::span<const double> a) const override {
+  Outcome RewardAndEnd(double before, double after, std::span<const double> a) const override {
     const double height = qpos()[1], tilt = qpos()[2];
     const bool healthy = 0.8 < height && height < 2.0 && -1 < tilt && tilt < 1;
     return {(after - before) / dt() + 1 - 1e-3 * SquaredNorm(a), !healthy};

@@ -124,7 +124,7 @@ void MujocoEnv::Reset(Rng& rng, std::span<double> obs) {
   std::copy_n(model_->qpos0, q.size(), q.begin());
   std::fill(v.begin(), v.end(), 0.0);
   Clear();
-  Perturb(rng, q, v);
+  DrawStart(rng, q, v);
   Begin(obs);
 }
 
@@ -149,7 +149,7 @@ void MujocoEnv::Clear() {
 
 void MujocoEnv::Begin(std::span<double> obs) {
   data_->time = 0;
-  Derive();
+  ComputeDerived();
   CheckWarnings();
   Finish(obs);
 }
@@ -160,14 +160,14 @@ StepResult MujocoEnv::Step(std::span<const double> a, std::span<double> obs) {
   Simulate();
   ++steps_;
   CheckWarnings();
-  const double before = gauge_;
+  const double before = reward_quantity_;
   Finish(obs);
-  const Outcome outcome = Judge(before, gauge_, a);
+  const Outcome outcome = RewardAndEnd(before, reward_quantity_, a);
   if (!std::isfinite(outcome.reward)) Diverged("non-finite reward");
   return {outcome.reward, outcome.terminated, steps_ >= spec_.time_limit};
 }
 
-void MujocoEnv::Derive() { mj_forward(model_.get(), data_.get()); }
+void MujocoEnv::ComputeDerived() { mj_forward(model_.get(), data_.get()); }
 
 void MujocoEnv::Simulate() {
   for (int i = 0; i < frame_skip_; ++i) mj_step(model_.get(), data_.get());
@@ -177,7 +177,7 @@ void MujocoEnv::Finish(std::span<double> obs) {
   Check(obs.size() == static_cast<std::size_t>(spec_.S), spec_.id, ": room for ", obs.size(),
         " observations, not ", spec_.S);
   if (contact_forces_) mj_rnePostConstraint(model_.get(), data_.get());
-  gauge_ = Gauge();
+  reward_quantity_ = RewardQuantity();
   ObservationWriter writer(obs);
   Observe(writer);
   Check(writer.Missing() == 0, spec_.id, ": ", writer.Missing(), " observations too few");
@@ -201,12 +201,12 @@ void MujocoEnv::Diverged(const std::string& what) const {
 
 // mj_step computes everything that it reads from these and the controls, and the observation and
 // the gauge are those of the last step: no forward call is needed, and saving changes nothing.
-void MujocoEnv::Visit(StateVisitor& v, const std::string& prefix) {
+void MujocoEnv::Serialize(StateVisitor& v, const std::string& prefix) {
   v.Double(prefix + "time", data_->time);
   v.Doubles(prefix + "qpos", data_->qpos, qpos().size());
   v.Doubles(prefix + "qvel", data_->qvel, qvel().size());
   v.Doubles(prefix + "qacc_warmstart", data_->qacc_warmstart, qvel().size());
-  v.Double(prefix + "gauge", gauge_);
+  v.Double(prefix + "gauge", reward_quantity_);
   v.Within(0, spec_.time_limit);
   v.Int(prefix + "episode_step", steps_);
   const std::span<double> target = Target();

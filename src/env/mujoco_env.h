@@ -45,7 +45,7 @@ class MujocoEnv : public Env {
   const EnvSpec& Spec() const final { return spec_; }
   void Reset(Rng& rng, std::span<double> obs) final;
   StepResult Step(std::span<const double> a, std::span<double> obs) final;
-  void Visit(StateVisitor& v, const std::string& prefix) override;
+  void Serialize(StateVisitor& v, const std::string& prefix) override;
 
   /// Starts an episode at a given qpos (nq), qvel (nv) instead of a random one.
   void ResetTo(std::span<const double> qpos, std::span<const double> qvel, std::span<double> obs);
@@ -81,19 +81,19 @@ class MujocoEnv : public Env {
 
   /// Adds the reset noise. Given qpos0 and zeros; draws for qpos entry after entry, then for qvel,
   /// then for Target. It may let the simulator run: the episode starts after it.
-  virtual void Perturb(Rng& rng, std::span<double> qpos, std::span<double> qvel) = 0;
+  virtual void DrawStart(Rng& rng, std::span<double> qpos, std::span<double> qvel) = 0;
   /// An environment step with the controls in data().ctrl: `frame_skip` calls of mj_step with no
   /// mj_forward after, so that quantities derived from the position (xpos, xipos, site_xpos,
   /// cinert, ...) are those of the last substep's start (RK4: of its last stage), as in gym.
   virtual void Simulate();
   /// Derives the rest of an episode's first state from qpos and qvel: mj_forward.
-  virtual void Derive();
+  virtual void ComputeDerived();
   /// The one number of a state that the reward of the next step reads (a position, a distance). It
   /// is taken after a reset and after each step, when it is as stale as in the reference.
-  virtual double Gauge() const { return 0; }
+  virtual double RewardQuantity() const { return 0; }
   /// Reward and end of the step that has just been simulated with a (A); gauges before and after
   /// it.
-  virtual Outcome Judge(double before, double after, std::span<const double> a) const = 0;
+  virtual Outcome RewardAndEnd(double before, double after, std::span<const double> a) const = 0;
   virtual void Observe(ObservationWriter& obs) const = 0;
 
   int frame_skip() const { return frame_skip_; }
@@ -129,8 +129,8 @@ class MujocoEnv : public Env {
   bool contact_forces_;
   std::unique_ptr<mjModel, Delete> model_;
   std::unique_ptr<mjData, Delete> data_;
-  double gauge_ = 0;        // of the current state
-  std::int64_t steps_ = 0;  // of the running episode
+  double reward_quantity_ = 0;  // of the current state
+  std::int64_t steps_ = 0;      // of the running episode
 };
 
 }  // namespace o2v

@@ -170,7 +170,7 @@ File ParseFile(const std::filesystem::path& path) {
   return file;
 }
 
-/// Names of tensors in the file for those that Visit functions use.
+/// Names of tensors in the file for those that Serialize functions use.
 class Names {
  public:
   explicit Names(Learner& learner) {
@@ -350,7 +350,7 @@ void SavePolicy(const std::filesystem::path& path, const Metadata& metadata, Lea
                 Normalizer& normalizer) {
   SaveCheckpoint(path, metadata, learner, [&](StateVisitor& v) {
     for (Param* p : learner.Params()) v.Matrix(p->name, p->value);
-    normalizer.Visit(v);
+    normalizer.Serialize(v);
   });
 }
 

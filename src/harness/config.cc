@@ -545,7 +545,8 @@ Experiment ReadExperiment(const ConfigText& file) {
   const toml::table* section = Section(file, root, "experiment");
   if (!section) throw ConfigError(file.name + ": missing section [experiment]");
 
-  const std::vector<std::string> known = {"tasks", "algorithms", "fidelities", "seeds", "flips"};
+  const std::vector<std::string> known = {"tasks", "algorithms", "fidelities", "seeds",
+                                          "ablations"};
   for (const auto& [key, node] : *section) {
     if (!Contains(known, key.str())) Unknown(Origin(file, node), "key", key.str(), known);
   }
@@ -574,12 +575,12 @@ Experiment ReadExperiment(const ConfigText& file) {
   read("seeds", [&](const Scalar& scalar) {
     experiment.seeds.push_back(static_cast<std::uint64_t>(ToInt("seeds", scalar, 0)));
   });
-  if (section->contains("flips")) {
+  if (section->contains("ablations")) {
     std::vector<std::string> switches;
     for (const SwitchInfo& info : SwitchRegistry()) {
       if (!info.flag) switches.push_back(info.name);  // a flag is the same in both fidelities
     }
-    read_words("flips", experiment.flips, switches);
+    read_words("ablations", experiment.ablations, switches);
   }
   return experiment;
 }

@@ -85,8 +85,8 @@ struct Experiment {
   std::string name;  // the file's, without folder and ".toml"
   std::vector<std::string> tasks, algorithms, fidelities;
   std::vector<std::uint64_t> seeds;
-  std::vector<std::string> flips;  // switches, each turned alone to the other fidelity's setting;
-                                   // empty: runs of the fidelities as they are
+  std::vector<std::string> ablations;  // switches, each turned alone to the other fidelity's
+                                       // setting; empty: runs of the fidelities as they are
 };
 
 /// Reads the section [experiment]. Throws ConfigError.

@@ -119,15 +119,15 @@ std::vector<Job> ListJobs(const JobQuery& query) {
     for (std::size_t e = 0; e < experiments.size(); ++e) {
       const Experiment& x = experiments[e];
       if (i >= x.seeds.size()) continue;
-      std::vector<const SwitchInfo*> flips;
+      std::vector<const SwitchInfo*> ablations;
       for (const SwitchInfo& info : SwitchRegistry()) {
-        if (std::find(x.flips.begin(), x.flips.end(), info.name) != x.flips.end()) {
-          flips.push_back(&info);
+        if (std::find(x.ablations.begin(), x.ablations.end(), info.name) != x.ablations.end()) {
+          ablations.push_back(&info);
         }
       }
-      if (x.flips.empty()) flips.push_back(nullptr);
+      if (x.ablations.empty()) ablations.push_back(nullptr);
       for (const std::string& fidelity : x.fidelities) {
-        for (const SwitchInfo* flip : flips) {
+        for (const SwitchInfo* flip : ablations) {
           for (const std::string& task : x.tasks) {
             for (const std::string& algorithm : x.algorithms) {
               add(e, fidelity, flip, task, algorithm, x.seeds[i]);

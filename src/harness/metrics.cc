@@ -66,7 +66,7 @@ void CsvLog::Flush() {
   SyncFile(path_);
 }
 
-void CsvLog::Visit(StateVisitor& v, const std::string& prefix) {
+void CsvLog::Serialize(StateVisitor& v, const std::string& prefix) {
   v.Count(prefix + ".bytes", bytes_);
   v.Int(prefix + ".hash", hash_);
 }
@@ -97,7 +97,7 @@ void RunLogs::AddEpisode(const Episode& e) {
                  Decimal(e.terminated), Decimal(e.truncated)});
 }
 
-void RunLogs::AddUpdate(std::int64_t step, std::span<const Ratio> ratios) {
+void RunLogs::AddUpdate(std::int64_t step, std::span<const SumAndCount> ratios) {
   Check(Index(ratios.size()) == sums_.size(), "updates.csv: got ", ratios.size(), " numbers for ",
         sums_.size(), " columns");
   for (std::size_t i = 0; i < ratios.size(); ++i) {
@@ -112,7 +112,7 @@ void RunLogs::EndUpdates() {
   if (step_ == row_step_) return;
   std::vector<std::string> cells = {Decimal(step_)};
   for (Index i = 0; i < sums_.size(); ++i) {
-    cells.push_back(Decimal(Ratio{sums_(i), ns_(i)}.Value()));
+    cells.push_back(Decimal(SumAndCount{sums_(i), ns_(i)}.Value()));
   }
   updates_.Row(cells);
   row_step_ = step_;
@@ -130,14 +130,14 @@ void RunLogs::Flush() {
   for (CsvLog& log : evals_) log.Flush();
 }
 
-void RunLogs::Visit(StateVisitor& v) {
-  episodes_.Visit(v, "episodes");
-  updates_.Visit(v, "updates");
+void RunLogs::Serialize(StateVisitor& v) {
+  episodes_.Serialize(v, "episodes");
+  updates_.Serialize(v, "updates");
   v.Count("updates.row_step", row_step_);
   v.Count("updates.step", step_);
   v.Doubles("updates.sums", sums_);
   v.Doubles("updates.ns", ns_);
-  for (CsvLog& log : evals_) log.Visit(v, "evals");
+  for (CsvLog& log : evals_) log.Serialize(v, "evals");
 }
 
 std::vector<CurvePoint> ReadEpisodes(const std::filesystem::path& path) {

@@ -22,8 +22,8 @@ class CsvLog {
 
   /// Starts an empty file: the header only.
   void Create();
-  /// Cuts the file to the state last seen by Visit and appends from there. Throws Error when the
-  /// file is shorter, its beginning has changed, or its columns are other ones.
+  /// Cuts the file to the state last seen by Serialize and appends from there. Throws Error when
+  /// the file is shorter, its beginning has changed, or its columns are other ones.
   void Resume();
   /// Appends a row of ready cells.
   void Row(const std::vector<std::string>& cells);
@@ -31,7 +31,7 @@ class CsvLog {
   void Flush();
 
   /// `<prefix>.bytes`, `<prefix>.hash`.
-  void Visit(StateVisitor& v, const std::string& prefix);
+  void Serialize(StateVisitor& v, const std::string& prefix);
 
  private:
   void Append(const std::string& line);
@@ -58,13 +58,13 @@ class RunLogs {
   void AddEpisode(const Episode& episode);
   /// The statistics of the update at `step`. A row is written, with the values of the sums of the
   /// updates since the last row, once kRowSteps have passed since that.
-  void AddUpdate(std::int64_t step, std::span<const Ratio> ratios);
+  void AddUpdate(std::int64_t step, std::span<const SumAndCount> ratios);
   /// No update follows: writes a row of those since the last one.
   void EndUpdates();
   void AddEval(std::int64_t step, int episode, double ret);
   /// Before a checkpoint, which holds the lengths of the files: none may be shorter than it says.
   void Flush();
-  void Visit(StateVisitor& v);
+  void Serialize(StateVisitor& v);
 
  private:
   CsvLog episodes_, updates_;

@@ -300,9 +300,9 @@ class Run {
 
   StateWalk Walk() {
     return [this](StateVisitor& v) {
-      algorithm_->Visit(v);
-      env_.Visit(v);
-      logs_.Visit(v);
+      algorithm_->Serialize(v);
+      env_.Serialize(v);
+      logs_.Serialize(v);
     };
   }
 
@@ -326,7 +326,7 @@ class Run {
   void Iterate() {
     const std::int64_t before = env_.TotalSteps();
     algorithm_->Collect(env_, episodes_);
-    const std::vector<Ratio>& stats = algorithm_->Update();
+    const std::vector<SumAndCount>& stats = algorithm_->Update();
     RequireFinite(stats);
     LogEpisodes();
     logs_.AddUpdate(env_.TotalSteps(), stats);
@@ -335,7 +335,7 @@ class Run {
 
   /// Throws DivergedError when the update left a number that is not finite, before that is logged
   /// or saved: a statistic, a parameter, the normaliser.
-  void RequireFinite(const std::vector<Ratio>& stats) const {
+  void RequireFinite(const std::vector<SumAndCount>& stats) const {
     for (std::size_t i = 0; i < stats.size(); ++i) {
       if (!std::isfinite(stats[i].sum)) Diverged(algorithm_->StatNames()[i]);
     }

@@ -71,7 +71,7 @@ double Adam::Step(std::span<const char> in_graph, IdleRule idle) {
   return norm;
 }
 
-void Adam::Visit(StateVisitor& visitor) {
+void Adam::Serialize(StateVisitor& visitor) {
   for (std::size_t i = 0; i < params_.size(); ++i) {
     visitor.Matrix("adam.m." + params_[i]->name, m_[i]);
     visitor.Matrix("adam.v." + params_[i]->name, v_[i]);

@@ -43,7 +43,7 @@ class Adam {
   void Freeze(std::size_t i) { frozen_.at(i) = 1; }
 
   /// Moments `adam.m.<name>`, `adam.v.<name>` and the counters `adam.t`.
-  void Visit(StateVisitor& v);
+  void Serialize(StateVisitor& v);
 
  private:
   std::vector<Param*> params_;

@@ -10,8 +10,8 @@
 
 namespace o2v {
 
-/// Body(n_in, h): Linear(n_in -> h), g, Linear(h -> h), g. Source: spec 2.1.
-struct Body {
+/// MlpTrunk(n_in, h): Linear(n_in -> h), g, Linear(h -> h), g. Source: spec 2.1.
+struct MlpTrunk {
   Linear layer0, layer1;
   Activation g = Activation::kTanh;
 
@@ -20,10 +20,10 @@ struct Body {
     Mat dh0;     // (h, B) scratch of Backward
   };
 
-  Body() = default;
+  MlpTrunk() = default;
   /// `name`.0.W, `name`.0.b, `name`.1.W, `name`.1.b; orthogonal weights of gain 1, zero biases.
-  Body(const std::string& name, Index n_in, Index h, Activation activation,
-       const Initialiser& init);
+  MlpTrunk(const std::string& name, Index n_in, Index h, Activation activation,
+           const Initialiser& init);
 
   /// x (n_in, B) -> cache.h1 (h, B).
   void Forward(const ConstMatRef& x, Cache& cache) const;
@@ -40,18 +40,18 @@ struct Body {
 };
 
 /// A body and a linear output layer (weights orthogonal x 1e-3, bias 0). Source: spec 2.1.
-struct Net {
-  Body body;
+struct Mlp {
+  MlpTrunk body;
   Linear head;
 
   struct Cache {
-    Body::Cache body;
+    MlpTrunk::Cache body;
     Mat out, dout;  // (n_out, B); dout, the adjoint of out, is the input of Backward
     Mat dhidden;    // (h, B) scratch
   };
 
-  Net() = default;
-  Net(const std::string& body_name, const std::string& head_name, Index n_in, Index h, Index n_out,
+  Mlp() = default;
+  Mlp(const std::string& body_name, const std::string& head_name, Index n_in, Index h, Index n_out,
       Activation activation, const Initialiser& init);
 
   /// x (n_in, B) -> cache.out.

@@ -9,7 +9,7 @@
 namespace o2v {
 
 /// One critic's view of the samples (DAC: the high or "hat" and the low or "bar" MDP; spec 4.6).
-struct Stream {
+struct StageTargets {
   Vec logp_old;  // (B) log-probability of the choice when it was made
   Vec adv_hat;   // (B) advantage, normalised over the whole rollout
   Vec ret;       // (B) value target, the lambda = 1 return
@@ -17,11 +17,11 @@ struct Stream {
 
 /// B samples; a rollout is flattened time-major (all workers of step 0, then step 1, ...).
 struct Batch {
-  Mat s;                       // (S, B) normalised states
-  Mat a;                       // (A, B) raw (unclipped) actions
-  std::vector<int> o, o_prev;  // (B) options, 0-based
-  std::vector<char> init;      // (B) flag the option policy is given in the update
-  Stream high, low;            // single-stage methods use `low`
+  Mat s;                        // (S, B) normalised states
+  Mat a;                        // (A, B) raw (unclipped) actions
+  std::vector<int> o, o_prev;   // (B) options, 0-based
+  std::vector<char> init;       // (B) flag the option policy is given in the update
+  StageTargets option, action;  // single-stage methods use `action`
 
   // Kept by the methods that need them, else empty.
   Mat P_old;  // (K, B) probabilities that the options were drawn with: DAC, DAC-OneStep

@@ -16,7 +16,7 @@ namespace o2v {
 template <typename Use>
 void ForEachMinibatch(std::vector<int>& order, int size, Rng& rng, Use&& use) {
   std::iota(order.begin(), order.end(), 0);
-  for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[rng.Below(i)]);
+  for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[rng.UniformInt(i)]);
   const std::size_t block = static_cast<std::size_t>(size);
   for (std::size_t start = 0; start < order.size(); start += block) {
     use(std::span<const int>(order).subspan(start, std::min(block, order.size() - start)));

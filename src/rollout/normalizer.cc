@@ -34,7 +34,7 @@ void Normalizer::Set(const VecD& mean, const VecD& var, double count) {
   inv_std_ = (var_.array() + 1e-8).sqrt().inverse();
 }
 
-void Normalizer::Visit(StateVisitor& v) {
+void Normalizer::Serialize(StateVisitor& v) {
   v.Doubles("normalizer.mean", mean_);
   v.Doubles("normalizer.var", var_);
   v.Double("normalizer.count", count_);

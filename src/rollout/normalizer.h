@@ -26,7 +26,7 @@ class Normalizer {
   void Set(const VecD& mean, const VecD& var, double count);
 
   /// `normalizer.mean`, `.var`, `.count`.
-  void Visit(StateVisitor& v);
+  void Serialize(StateVisitor& v);
 
  private:
   VecD mean_, var_;

@@ -33,7 +33,7 @@ void Rollout::BootstrapTimeLimits(const Transition& transition, int t, double ga
 
 void Rollout::MakeTargets(double gamma, double lambda, double adv_std_eps) {
   for (CriticTargets& critic : critics) {
-    Stream& out = &critic == &critics.back() ? batch.low : batch.high;
+    StageTargets& out = &critic == &critics.back() ? batch.action : batch.option;
     Gae(critic.r, mask, critic.v, gamma, lambda, critic.adv, critic.ret);
     NormalizeAdvantages(critic.adv, adv_std_eps, out.adv_hat);
     out.ret = Eigen::Map<const VecD>(critic.ret.data(), critic.ret.size()).cast<Real>();

@@ -29,8 +29,8 @@ std::span<const T> Rows(const std::vector<T>& x, Index row, Index n) {
   return std::span<const T>(x).subspan(std::size_t(row), std::size_t(n));
 }
 
-/// A rollout of T steps of N workers with one critic, whose advantages and targets are batch.low,
-/// or with two, of which the first one's are batch.high. Source: spec 1.3.
+/// A rollout of T steps of N workers with one critic, whose advantages and targets are
+/// batch.action, or with two, of which the first one's are batch.option. Source: spec 1.3.
 struct Rollout {
   Batch batch;  // T N samples, time-major
   MatD mask;    // (N, T) 0 where an episode ended

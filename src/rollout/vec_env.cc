@@ -100,8 +100,8 @@ void VecEnv::Step(const Mat& a, Transition& out, std::vector<Episode>& episodes)
   total_steps_ += n;
 }
 
-void VecEnv::Visit(StateVisitor& v) {
-  normalizer_.Visit(v);
+void VecEnv::Serialize(StateVisitor& v) {
+  normalizer_.Serialize(v);
   v.Count("total_steps", total_steps_);
   v.Matrix("states", s_);
   std::vector<int> init(init_.begin(), init_.end());
@@ -111,8 +111,8 @@ void VecEnv::Visit(StateVisitor& v) {
   v.Ints("episode_lengths", lengths_);
   for (std::size_t i = 0; i < envs_.size(); ++i) {
     const std::string name = "worker" + std::to_string(i) + ".";
-    rngs_[i].Visit(v, name + "rng");
-    envs_[i]->Visit(v, name);
+    rngs_[i].Serialize(v, name + "rng");
+    envs_[i]->Serialize(v, name);
   }
 }
 

@@ -49,10 +49,10 @@ class VecEnv {
   /// Starts an episode in every worker and takes the observations into the normaliser.
   void Reset();
   /// Puts the workers on another task of the same sizes and resets it; the running episodes are
-  /// forgotten, normaliser, streams and step counter go on. Unless `set_init`, Init() stays as it
-  /// was: the new task looks like a continuation of the old episode. Source: spec 6.
+  /// forgotten, normaliser, streams and step counter go on. Unless `set_init`, EpisodeStarts()
+  /// stays as it was: the new task looks like a continuation of the old episode. Source: spec 6.
   void ChangeTask(const Factory& make, bool set_init);
-  /// Puts the workers on another task without touching anything else, for Visit to fill in.
+  /// Puts the workers on another task without touching anything else, for Serialize to fill in.
   void ReplaceEnvs(const Factory& make);
   /// Steps every worker with a (A, N), clipped here to the control range. Appends ended episodes.
   /// Throws DivergedError as Env::Step, and when a return overflows.
@@ -61,10 +61,10 @@ class VecEnv {
   /// (S, N) normalised states; at an episode's end the reset observation. Spec 1.1.
   const Mat& States() const { return s_; }
   /// (N) 1 where States() is the first of an episode.
-  const std::vector<char>& Init() const { return init_; }
+  const std::vector<char>& EpisodeStarts() const { return init_; }
   const Normalizer& normalizer() const { return normalizer_; }
 
-  void Visit(StateVisitor& v);
+  void Serialize(StateVisitor& v);
 
  private:
   void Observe();  // raw_ into the normaliser, then into s_

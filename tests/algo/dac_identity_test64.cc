@@ -130,7 +130,7 @@ TEST(DacIdentity, TrajectoriesTargetsAndLowAdvantagesAreEqual) {
   std::vector<double> stats[2];
   for (std::size_t i : {0, 1}) {
     pair.methods[i]->Collect(pair.envs[i], episodes[i]);
-    for (const Ratio& ratio : pair.methods[i]->Update()) stats[i].push_back(ratio.Value());
+    for (const SumAndCount& ratio : pair.methods[i]->Update()) stats[i].push_back(ratio.Value());
   }
   EXPECT_EQ(pair.envs[0].States(), pair.envs[1].States());
   ASSERT_EQ(episodes[0].size(), 2u * (32 / 7));

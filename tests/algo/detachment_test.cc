@@ -44,7 +44,7 @@ struct Reached {
   void TargetsAreValuesTaken() {
     Mat q;
     algorithm->OptionValues(batch.s, batch.o, q);
-    for (Index b = 0; b < batch.Size(); ++b) batch.low.ret(b) = q(batch.o[std::size_t(b)], b);
+    for (Index b = 0; b < batch.Size(); ++b) batch.action.ret(b) = q(batch.o[std::size_t(b)], b);
   }
 
   std::unique_ptr<Algorithm> algorithm;
@@ -102,7 +102,7 @@ TEST(Detachment, OfOption2VecTheOptionLossReachesTheEmbeddings) {
 TEST(Detachment, OfOption2VecTheCriticDoesNotReachTheEmbeddings) {
   // Without advantages and entropy only the value loss is left.
   Reached r("option2vec", Fidelity::kPaper, {"entropy_weight_option=0"});
-  r.batch.high.adv_hat.setZero();
+  r.batch.option.adv_hat.setZero();
   r.Loss(kHigh);
   EXPECT_EQ(r.Gradient("embed.W_o"), 0);
   EXPECT_GT(r.Gradient("critic.body.0.W"), 0);
@@ -138,7 +138,7 @@ TEST(Detachment, OfDacTheValueLossHoldsTheOptionPolicyConstant) {
     Reached dac("dac_ppo", fidelity, {"entropy_weight=0"});
     Reached one("dac_onestep", fidelity, {"entropy_weight=0"});
     for (Reached* r : {&dac, &one}) {
-      r->batch.high.adv_hat.setZero();
+      r->batch.option.adv_hat.setZero();
       r->Loss(kHigh);
       EXPECT_GT(r->Gradient("critic.q"), 0);
     }
@@ -165,7 +165,7 @@ TEST(Detachment, OfReleasedOneStepTheNetOfTheOptionServesFirstStatesAlone) {
 TEST(Detachment, OfPpocTheTerminationTermHoldsCriticAndMasterConstant) {
   for (const Fidelity fidelity : kFidelities) {
     Reached r("ppoc", fidelity, {"entropy_weight=0"});
-    r.batch.low.adv_hat.setZero();
+    r.batch.action.adv_hat.setZero();
     r.TargetsAreValuesTaken();
     EXPECT_NE(r.Loss(kAll).termination, 0);
     EXPECT_GT(r.Gradient(".beta."), 0);
@@ -178,7 +178,7 @@ TEST(Detachment, OfPpocTheMastersWeightIsConstant) {
   // It holds beta, which the advantages do not reach through it.
   Reached r("ppoc");
   const std::vector<Mat> with = r.Gradients(kAll, ".beta.");
-  r.batch.low.adv_hat.setZero();
+  r.batch.action.adv_hat.setZero();
   EXPECT_EQ(r.Gradients(kAll, ".beta."), with);
 }
 
@@ -187,7 +187,7 @@ TEST(Detachment, OfPpocTheMastersWeightIsConstant) {
 /// Keeps the target network.
 class TargetNetwork final : public StateVisitor {
  public:
-  explicit TargetNetwork(Algorithm& algorithm) { algorithm.Visit(*this); }
+  explicit TargetNetwork(Algorithm& algorithm) { algorithm.Serialize(*this); }
   void Matrix(std::string_view name, Mat& x) override {
     if (name.starts_with("target.")) weights.push_back(x);
   }

@@ -17,9 +17,9 @@ namespace {
 class StreamState final : public StateVisitor {
  public:
   StreamState(Algorithm& algorithm, std::string name) : name_("rng." + name) {
-    algorithm.Visit(*this);
+    algorithm.Serialize(*this);
   }
-  explicit StreamState(Rng& rng) : name_("rng") { rng.Visit(*this, name_); }
+  explicit StreamState(Rng& rng) : name_("rng") { rng.Serialize(*this, name_); }
   void Matrix(std::string_view, Mat&) override {}
   void Doubles(std::string_view, double*, std::size_t) override {}
   void Ints(std::string_view name, std::int64_t* x, std::size_t n) override {
@@ -38,10 +38,10 @@ struct Dropping {
   VecEnv env = PointTask(config.workers, /*time_limit=*/5);
   std::unique_ptr<Algorithm> algorithm = MakeRunAlgorithm(config, env.Spec());
   Option2VecSizes sizes{.S = 1, .A = 1, .K = 4, .D = 6, .F = 7, .heads = 1, .h = 8, .h_init = 16};
-  OptionPolicyNet net{
+  PolicyOverOptions net{
       sizes, {.two_tokens = true, .init_relu = true, .prev_embed_grad = false}, Initialiser()};
-  OptionPolicyNet::Tables tables;
-  OptionPolicyNet::Cache c;
+  PolicyOverOptions::Tables tables;
+  PolicyOverOptions::Cache c;
 
   Dropping() {
     Rng rng(4, "weights");
@@ -71,7 +71,7 @@ TEST(Option2Vec, ActsThroughFreshMasksOfItsProbability) {
   Mat mu, sigma, a;
   for (int t = 0; t < on.config.hyper.Int("rollout"); ++t) {
     draw();
-    on.net.Forward(own.States(), o, own.Init(), on.tables, &on.c.masks, on.c);
+    on.net.Forward(own.States(), o, own.EpisodeStarts(), on.tables, &on.c.masks, on.c);
     SampleCategorical(on.c.P, policy, o);
     on.algorithm->ActionPolicy(own.States(), o, mu, sigma);
     SampleGaussian(mu, sigma, policy, a);

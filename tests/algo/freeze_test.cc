@@ -101,10 +101,10 @@ TEST(Freeze, OtherGradientsAreThoseOfNoFreeze) {
 TEST(Freeze, BelongsToTheStateOfAResumedRun) {
   Frozen before(Freeze::kPaper);
   MemoryVisitor memory;
-  before.algorithm->Visit(memory);
+  before.algorithm->Serialize(memory);
   std::unique_ptr<Algorithm> after = Small(Freeze::kPaper, Fidelity::kReleased);
   memory.load = true;
-  after->Visit(memory);
+  after->Serialize(memory);
   const Mat W_o = FindParam(*after, "embed.W_o").value;
   after->Loss(kHigh, before.batch, nullptr);
   after->Step(kHigh);

@@ -99,7 +99,7 @@ TEST(IdleTensors, OfTheInitialNetStartTheirCountLateInReleased) {
     algorithm->Loss(kHigh, batch, nullptr);
     algorithm->Step(kHigh);
     StepCounts counts;
-    algorithm->Visit(counts);
+    algorithm->Serialize(counts);
     const std::vector<Param*> params = algorithm->Params();
     for (std::size_t i = 0; i < params.size(); ++i) {
       if (!params[i]->name.starts_with("init.")) continue;
@@ -117,7 +117,7 @@ TEST(Minibatches, OfARemainderAreUsed) {
     const auto algorithm = MakeRunAlgorithm(config, env.Spec());
     Iterate(*algorithm, env);
     StepCounts counts;
-    algorithm->Visit(counts);
+    algorithm->Serialize(counts);
     for (std::size_t i = 0; i < counts.t.size(); ++i) {
       int stages = 0;
       for (std::size_t stage = 0; stage < algorithm->StageNames().size(); ++stage) {

@@ -47,10 +47,10 @@ struct Episode4 {
   VecD Joint() {
     const std::vector<Param*> from = iopg->Params(), to = nets.Params();
     for (std::size_t i = 0; i < from.size(); ++i) to[i]->value = from[i]->value;
-    Net::Cache master;
+    Mlp::Cache master;
     Mat log_pi, pi;
     OptionNets::BetaCache beta;
-    OptionPolicies::Cache policy;
+    IntraOptionPolicies::Cache policy;
     nets.master.Forward(batch.s, master);
     LogSoftmax(master.out, log_pi, pi);
     nets.Beta(batch.s, {}, /*all=*/true, beta);
@@ -122,7 +122,7 @@ TEST(IopgEnumeration, GradientsAreThoseOfTheSum) {
     for (Param* p : e.iopg->Params()) {
       if (!p->name.starts_with("critic.")) slots.emplace_back(p->name, p->value, p->grad, loss);
     }
-    const Verdict verdict = Judge(Compare(slots, e.rng, /*most=*/21));
+    const Verdict verdict = RewardAndEnd(Compare(slots, e.rng, /*most=*/21));
     EXPECT_GT(verdict.entries, 300u);
     EXPECT_TRUE(verdict.Passed()) << verdict.largest_error << " of " << verdict.worst << ", "
                                   << ToString(beta_index);

@@ -48,7 +48,7 @@ TEST(Iopg, GradientsDoNotDependOnTheEpisodeBefore) {
 /// Steps of the running episode of each worker's copy.
 class Lengths final : public StateVisitor {
  public:
-  explicit Lengths(Algorithm& iopg) { iopg.Visit(*this); }
+  explicit Lengths(Algorithm& iopg) { iopg.Serialize(*this); }
   void Matrix(std::string_view, Mat&) override {}
   void Doubles(std::string_view, double*, std::size_t) override {}
   void Ints(std::string_view name, std::int64_t* x, std::size_t) override {

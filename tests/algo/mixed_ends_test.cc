@@ -51,7 +51,7 @@ class EndingEnv final : public Env {
     ++steps_;
     return {x_[0] - 2 * x_[1] + 0.5 * a[1], steps_ == ends_.terminated, steps_ == ends_.limit};
   }
-  void Visit(StateVisitor&, const std::string&) override {}
+  void Serialize(StateVisitor&, const std::string&) override {}
 
  private:
   EnvSpec spec_;
@@ -64,7 +64,7 @@ class EndingEnv final : public Env {
 /// All arrays that a learner saves, by name.
 class Arrays final : public StateVisitor, public std::map<std::string, MatD, std::less<>> {
  public:
-  explicit Arrays(Algorithm& algorithm) { algorithm.Visit(*this); }
+  explicit Arrays(Algorithm& algorithm) { algorithm.Serialize(*this); }
   void Matrix(std::string_view name, Mat& x) override { emplace(name, x.cast<double>()); }
   void Doubles(std::string_view, double*, std::size_t) override {}
   void Ints(std::string_view, std::int64_t*, std::size_t) override {}
@@ -76,7 +76,7 @@ class Scatter final : public StateVisitor {
  public:
   Scatter(Algorithm& algorithm, int round) : rng_(17, Concat("weights", round)) {
     for (Param* p : algorithm.Params()) Draw(p->value);
-    algorithm.Visit(*this);
+    algorithm.Serialize(*this);
   }
   void Matrix(std::string_view name, Mat& x) override {
     const bool episode = name.ends_with(".s") || name.ends_with(".a");
@@ -153,7 +153,7 @@ class MixedEnds {
     std::vector<Episode> episodes;
     learner_->Collect(*env_, episodes);
     std::vector<double> stats;
-    for (const Ratio& ratio : learner_->Update()) stats.push_back(ratio.Value());
+    for (const SumAndCount& ratio : learner_->Update()) stats.push_back(ratio.Value());
     if (method_ == "iopg") {
       IopgRound();
     } else {
@@ -362,7 +362,7 @@ class MixedEnds {
         Sample& x = step[i];
         x.s = own_env_->States().col(Index(i)).cast<double>();
         x.o_prev = o_prev_[i];
-        x.init = own_env_->Init()[i];
+        x.init = own_env_->EpisodeStarts()[i];
         x.p = Options(x.s, x.o_prev, x.init);
         if (!Is("ppo")) x.o = DrawOption(x.p, policy_rng_);
       }
@@ -392,7 +392,8 @@ class MixedEnds {
         for (std::size_t i = 0; i < kWorkers; ++i) step[i].v_last = last[i];
       }
     }
-    const std::vector<char> init = Is("oc") ? std::vector<char>(kWorkers, 0) : own_env_->Init();
+    const std::vector<char> init =
+        Is("oc") ? std::vector<char>(kWorkers, 0) : own_env_->EpisodeStarts();
     Learn(steps, Beyond(own_env_->States(), init));
   }
 
@@ -437,8 +438,8 @@ class MixedEnds {
       batch.o[i] = x.o;
       batch.o_prev[i] = x.o_prev;
       batch.init[i] = Is("option2vec") && Released(sw_.o2v_init_flag) ? done : x.init;
-      batch.high.logp_old(b) = Real(x.logp_high);
-      batch.low.logp_old(b) = Real(x.logp_low);
+      batch.option.logp_old(b) = Real(x.logp_high);
+      batch.action.logp_old(b) = Real(x.logp_low);
       if (!batch.stop.empty()) batch.stop[i] = x.stop;
       if (batch.P_old.size() > 0) batch.P_old.col(b) = x.p.cast<Real>();
       if (Is("oc")) {
@@ -452,7 +453,7 @@ class MixedEnds {
     }
     expected_.clear();
     VecD adv, ret;
-    const auto finish = [&](double Values::*critic, const VecD& v, Stream& stream) {
+    const auto finish = [&](double Values::*critic, const VecD& v, StageTargets& stream) {
       Targets(steps, after, critic, adv, ret);
       if (!Is("oc")) {
         const double mean = adv.mean();
@@ -462,9 +463,9 @@ class MixedEnds {
       stream.ret = ret.cast<Real>();
       return 0.5 * (v - ret).squaredNorm() / double(n);
     };
-    const double low = finish(&Values::low, v_low, batch.low);
+    const double low = finish(&Values::low, v_low, batch.action);
     if (TwoStages()) {
-      const double high = finish(&Values::high, v_high, batch.high);
+      const double high = finish(&Values::high, v_high, batch.option);
       // The released Option2Vec feeds its critic with options that the update draws.
       if (!Released(sw_.o2v_option_in_update)) {
         expected_ = {{"value_loss_high", high}, {"value_loss_low", low}};
@@ -506,7 +507,7 @@ class MixedEnds {
         const std::string prefix = "copy" + std::to_string(i) + ".";
         Sample x;
         x.s = own_env_->States().col(Index(i)).cast<double>();
-        x.init = own_env_->Init()[i];
+        x.init = own_env_->EpisodeStarts()[i];
         x.o = DrawOption(Options(x.s, o_prev_[i], x.init, prefix), policy_rng_);
         DrawAction(prefix, policy_rng_, x);
         o_prev_[i] = x.o;

@@ -12,7 +12,7 @@ class Weights final : public StateVisitor {
  public:
   explicit Weights(Algorithm& algorithm) {
     for (const Param* p : algorithm.Params()) online.push_back(p->value);
-    algorithm.Visit(*this);
+    algorithm.Serialize(*this);
   }
   void Matrix(std::string_view name, Mat& x) override {
     if (name.starts_with("target.")) target.push_back(x);

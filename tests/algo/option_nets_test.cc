@@ -53,10 +53,10 @@ Mat Spread(const Mat& one, const std::vector<int>& o) {
   return all;
 }
 
-TEST(OptionPolicies, OfOneAreThoseOfAllPickedByOption) {
+TEST(IntraOptionPolicies, OfOneAreThoseOfAllPickedByOption) {
   for (const Activation activation : {Activation::kTanh, Activation::kRelu}) {
     OnSamples on(activation);
-    OptionPolicies::Cache one, all;
+    IntraOptionPolicies::Cache one, all;
     on.nets.policy.ForwardOne(on.s, on.o, one);
     on.nets.policy.ForwardAll(on.s, all);
     ASSERT_EQ(all.nets.out.cols(), K * B);
@@ -65,11 +65,11 @@ TEST(OptionPolicies, OfOneAreThoseOfAllPickedByOption) {
   }
 }
 
-TEST(OptionPolicies, OfOneHaveTheGradientsOfAllWithZerosElsewhere) {
+TEST(IntraOptionPolicies, OfOneHaveTheGradientsOfAllWithZerosElsewhere) {
   for (const Activation activation : {Activation::kTanh, Activation::kRelu}) {
     OnSamples on(activation);
     const Mat dmu = RandomMat(A, B, on.rng), dsigma = RandomMat(A, B, on.rng);
-    OptionPolicies::Cache one, all;
+    IntraOptionPolicies::Cache one, all;
     on.nets.policy.ForwardOne(on.s, on.o, one);
     one.nets.dout = dmu;
     one.dsigma = dsigma;
@@ -110,7 +110,7 @@ TEST(OptionNets, TerminationsOfOneAreThoseOfAllPickedByOption) {
 
 TEST(OptionNets, AnAbsentOptionGetsNoGradient) {
   OnSamples on;  // without option K - 1
-  OptionPolicies::Cache c;
+  IntraOptionPolicies::Cache c;
   on.nets.policy.ForwardOne(on.s, on.o, c);
   c.nets.dout = RandomMat(A, B, on.rng);
   c.dsigma = RandomMat(A, B, on.rng);
@@ -122,9 +122,9 @@ TEST(OptionNets, AnAbsentOptionGetsNoGradient) {
   }
 }
 
-TEST(OptionBank, RefusesOptionsOfAnotherBatch) {
+TEST(PerOptionMlps, RefusesOptionsOfAnotherBatch) {
   OnSamples on;
-  OptionPolicies::Cache c;
+  IntraOptionPolicies::Cache c;
   on.o.pop_back();
   EXPECT_THROW(on.nets.policy.ForwardOne(on.s, on.o, c), Error);
 }

@@ -30,7 +30,7 @@ void ExpectMasterTerm(Fidelity weight, Omega&& omega) {
     const std::size_t i = std::size_t(b);
     const int o = batch.o[i], o_prev = batch.o_prev[i];
     const double credit = batch.init[i] ? 1 : omega(double(P(o, b)), double(pi(o, b)), o == o_prev);
-    expected -= credit * double(batch.low.adv_hat(b)) * std::log(double(pi(o, b))) / double(B);
+    expected -= credit * double(batch.action.adv_hat(b)) * std::log(double(pi(o, b))) / double(B);
   }
   EXPECT_NEAR(algorithm->Loss(0, batch, nullptr).master, expected, 1e-5);
 }

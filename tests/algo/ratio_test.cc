@@ -25,7 +25,7 @@ std::vector<double> Deviating(const std::string& method, Fidelity fidelity,
   return shares;
 }
 
-TEST(Ratio, IsOneInThePaperSettings) {
+TEST(SumAndCount, IsOneInThePaperSettings) {
   for (const AlgorithmEntry& method : AlgorithmRegistry()) {
     if (!HasRatio(method.id)) continue;
     for (const double share : Deviating(method.id, Fidelity::kPaper, {})) {
@@ -34,7 +34,7 @@ TEST(Ratio, IsOneInThePaperSettings) {
   }
 }
 
-TEST(Ratio, IsOneWhereTheReleasedCodeRecomputesWhatActed) {
+TEST(SumAndCount, IsOneWhereTheReleasedCodeRecomputesWhatActed) {
   for (const char* method : {"ppo", "ppoc", "dac_onestep"}) {
     for (const double share : Deviating(method, Fidelity::kReleased, {})) {
       EXPECT_EQ(share, 0) << method;
@@ -42,7 +42,7 @@ TEST(Ratio, IsOneWhereTheReleasedCodeRecomputesWhatActed) {
   }
 }
 
-TEST(Ratio, OfReleasedAhpDiffersByTheTerminationOfTheWrongOption) {
+TEST(SumAndCount, OfReleasedAhpDiffersByTheTerminationOfTheWrongOption) {
   EXPECT_EQ(Deviating("ahp_ppo", Fidelity::kReleased, {"ahp_beta_index=paper"})[0], 0);
   EXPECT_GT(Deviating("ahp_ppo", Fidelity::kReleased, {})[0], 0.1);
 }
@@ -54,17 +54,17 @@ Vec HighRatios(Algorithm& algorithm, Batch batch) {
   algorithm.OptionPolicy(batch.s, batch.o_prev, batch.init, P);
   const Index B = batch.Size();
   for (Index b = 0; b < B; ++b) {
-    batch.high.logp_old(b) = std::log(P(batch.o[std::size_t(b)], b));
+    batch.option.logp_old(b) = std::log(P(batch.o[std::size_t(b)], b));
   }
   Vec ratios(B);
   for (Index b = 0; b < B; ++b) {
-    batch.high.adv_hat = Vec::Unit(B, b);
+    batch.option.adv_hat = Vec::Unit(B, b);
     ratios(b) = Real(-double(B) * algorithm.Loss(0, batch, nullptr).surrogate);
   }
   return ratios;
 }
 
-TEST(Ratio, OfReleasedDacIsThatOfTheLostMask) {
+TEST(SumAndCount, OfReleasedDacIsThatOfTheLostMask) {
   // pi = 1/4, beta = 1/2 at the start: 0.625 for o = o', else 0.125. In the update rows 1, 2, ...
   // have 0.125 throughout, row 0 0.625 for every o' of the minibatch; spec 4.6 (g), 10.4.
   struct Row {
@@ -102,7 +102,7 @@ TEST(Ratio, OfReleasedDacIsThatOfTheLostMask) {
   }
 }
 
-TEST(Ratio, OfReleasedDacIsOneWithTheMaskAndInTheLowStage) {
+TEST(SumAndCount, OfReleasedDacIsOneWithTheMaskAndInTheLowStage) {
   EXPECT_EQ(Deviating("dac_ppo", Fidelity::kReleased, {"dac_update_mask=paper"}),
             (std::vector<double>{0, 0}));
   const std::vector<double> shares = Deviating("dac_ppo", Fidelity::kReleased, {});
@@ -110,14 +110,14 @@ TEST(Ratio, OfReleasedDacIsOneWithTheMaskAndInTheLowStage) {
   EXPECT_EQ(shares[1], 0);
 }
 
-TEST(Ratio, OfReleasedOption2VecDiffersByTheRedrawInTheActionStageAlone) {
+TEST(SumAndCount, OfReleasedOption2VecDiffersByTheRedrawInTheActionStageAlone) {
   const auto shares =
       Deviating("option2vec", Fidelity::kReleased, {"o2v_dropout=0", "o2v_init_flag=paper"});
   EXPECT_EQ(shares[0], 0);
   EXPECT_GT(shares[1], 0.2);
 }
 
-TEST(Ratio, OfReleasedOption2VecDiffersWhereInitAndDoneDiffer) {
+TEST(SumAndCount, OfReleasedOption2VecDiffersWhereInitAndDoneDiffer) {
   const auto shares =
       Deviating("option2vec", Fidelity::kReleased, {"o2v_dropout=0", "o2v_option_in_update=paper"});
   // Episodes of 7 steps: first states (5 of 32 steps) and last states (4 of 32).
@@ -125,7 +125,7 @@ TEST(Ratio, OfReleasedOption2VecDiffersWhereInitAndDoneDiffer) {
   EXPECT_EQ(shares[1], 0);
 }
 
-TEST(Ratio, DiffersByTheMasksWithDropout) {
+TEST(SumAndCount, DiffersByTheMasksWithDropout) {
   const auto shares = Deviating("option2vec", Fidelity::kPaper, {"o2v_dropout=0.2"});
   EXPECT_GT(shares[0], 0.5);
   EXPECT_EQ(shares[1], 0);  // the action net has no dropout

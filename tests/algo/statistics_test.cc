@@ -60,7 +60,7 @@ TEST(OptionUsage, IsTheSameWhereverRolloutsCutIt) {
   const std::vector<int> o = {0, 0, 0, 1, 1, 0, 0, 0, 0};
   for (const int rollout : {1, 2, 4, 9}) {
     OptionUsage usage(3);
-    std::vector<Ratio> sums(6), ratios;
+    std::vector<SumAndCount> sums(6), ratios;
     for (int t = 0; t < int(o.size()); ++t) {
       usage.Count(o[std::size_t(t)], t > 0 ? o[std::size_t(t - 1)] : 0, t == 0 || t == 8);
       if ((t + 1) % rollout != 0 && t + 1 < int(o.size())) continue;
@@ -74,7 +74,7 @@ TEST(OptionUsage, IsTheSameWhereverRolloutsCutIt) {
       }
     }
     std::vector<double> values;
-    for (const Ratio& sum : sums) values.push_back(sum.Value());
+    for (const SumAndCount& sum : sums) values.push_back(sum.Value());
     EXPECT_EQ(values, (std::vector<double>{7.0 / 9, 2.0 / 9, 0, 7.0 / 3, 2, 0})) << rollout;
   }
 }
@@ -90,7 +90,7 @@ TEST(Statistics, OfOptionsAreOfTheStepsSinceTheUpdateBefore) {
       const std::int64_t before = env.TotalSteps();
       algorithm->Collect(env, episodes);
       const double steps = double(env.TotalSteps() - before);
-      const std::vector<Ratio>& stats = algorithm->Update();
+      const std::vector<SumAndCount>& stats = algorithm->Update();
       double used = 0;
       for (std::size_t i = 0; i < names.size(); ++i) {
         if (!names[i].starts_with("usage_")) continue;

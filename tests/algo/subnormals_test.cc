@@ -20,7 +20,7 @@ class Subnormal final : public Method {
     Assemble(in, {&weight_}, {[](const std::string&) { return true; }}, nullptr, nullptr);
   }
   void Collect(VecEnv&, std::vector<Episode>&) override { acted = Half(); }
-  const std::vector<Ratio>& Update() override {
+  const std::vector<SumAndCount>& Update() override {
     Learn(0, Batch());
     return Report();
   }

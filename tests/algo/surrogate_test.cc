@@ -82,7 +82,7 @@ TEST(LossMeans, AverageTheMinibatches) {
   means.Add(terms, 2);
   terms.total = 5;
   means.Add(terms, 4);
-  std::vector<Ratio> ratios;
+  std::vector<SumAndCount> ratios;
   std::vector<std::string> names;
   means.Report(ratios);
   LossMeans::Names("low", names);
@@ -105,7 +105,7 @@ TEST(LossMeans, HaveTheColumnsOfAMethodBesideTheirOwn) {
   means.Clear();
   terms.termination = 8;
   means.Add(terms, 1);
-  std::vector<Ratio> ratios;
+  std::vector<SumAndCount> ratios;
   std::vector<std::string> names;
   means.Report(ratios);
   LossMeans::Names("all", names, more);
@@ -113,7 +113,7 @@ TEST(LossMeans, HaveTheColumnsOfAMethodBesideTheirOwn) {
                                              "entropy_all", "kl_all", "clip_fraction_all",
                                              "master_all", "termination_all", "grad_norm_all"}));
   std::vector<double> values;
-  for (const Ratio& ratio : ratios) values.push_back(ratio.Value());
+  for (const SumAndCount& ratio : ratios) values.push_back(ratio.Value());
   EXPECT_EQ(values, (std::vector<double>{0, 0, 0, 0, 0, 0, 2, 8, 1}));
 }
 

@@ -42,7 +42,7 @@ inline Batch RandomBatch(Index S, Index A, int K, Index B, Rng& rng) {
     }
     if (batch.init[i] && b >= kWorkers) batch.mask(b - kWorkers) = 0;
   }
-  for (Stream* stream : {&batch.high, &batch.low}) {
+  for (StageTargets* stream : {&batch.option, &batch.action}) {
     stream->logp_old = RandomMat(B, 1, rng, 0.2).array() - Real(2);
     stream->adv_hat = RandomMat(B, 1, rng);
     stream->ret = RandomMat(B, 1, rng);
@@ -82,7 +82,7 @@ class PointEnv final : public Env {
     obs[0] = x_ = std::clamp(x_ + 0.1 * a[0], -2.0, 2.0);
     return {-scale_ * std::abs(x_), false, ++steps_ == spec_.time_limit};
   }
-  void Visit(StateVisitor&, const std::string&) override {}
+  void Serialize(StateVisitor&, const std::string&) override {}
 
  private:
   EnvSpec spec_;
@@ -102,7 +102,7 @@ inline std::vector<double> Iterate(Algorithm& algorithm, VecEnv& env) {
   std::vector<Episode> episodes;
   algorithm.Collect(env, episodes);
   std::vector<double> stats;
-  for (const Ratio& ratio : algorithm.Update()) stats.push_back(ratio.Value());
+  for (const SumAndCount& ratio : algorithm.Update()) stats.push_back(ratio.Value());
   return stats;
 }
 

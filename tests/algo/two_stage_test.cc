@@ -110,8 +110,8 @@ TEST(TwoStageMethod, KeepsWhatWasDrawnWithItsProbability) {
   for (int b = 0; b < kWorkers * kSteps; ++b) {
     const int o = batch.o[std::size_t(b)];
     EXPECT_EQ(batch.P_old(o, b), Real(o == 0 ? 0.25 : 0.75));
-    EXPECT_NEAR(double(batch.high.logp_old(b)), std::log(o == 0 ? 0.25 : 0.75), 1e-6);
-    EXPECT_EQ(batch.low.logp_old(b), -3);
+    EXPECT_NEAR(double(batch.option.logp_old(b)), std::log(o == 0 ? 0.25 : 0.75), 1e-6);
+    EXPECT_EQ(batch.action.logp_old(b), -3);
   }
 }
 
@@ -122,8 +122,8 @@ TEST(TwoStageMethod, GivesEachStageTheReturnOfItsOwnCritic) {
   for (int i = 0; i < kWorkers; ++i) {
     const Index row = Index(kSteps - 1) * kWorkers + i;
     const double r = rollout.critics[0].r(i, kSteps - 1);
-    EXPECT_NEAR(double(rollout.batch.high.ret(row)), r + 125, 1e-4);
-    EXPECT_NEAR(double(rollout.batch.low.ret(row)), r + kGamma * rollout.critics[1].v(i, kSteps),
+    EXPECT_NEAR(double(rollout.batch.option.ret(row)), r + 125, 1e-4);
+    EXPECT_NEAR(double(rollout.batch.action.ret(row)), r + kGamma * rollout.critics[1].v(i, kSteps),
                 1e-4);
     EXPECT_NE(rollout.critics[1].v(i, kSteps), 250);
   }

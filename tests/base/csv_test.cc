@@ -104,9 +104,9 @@ TEST_F(Csv, DamagedFilesAreReadOrRefusedButNeverCrash) {
   for (int i = 0; i < 400; ++i) {
     std::string damaged = whole;
     if (i % 2 == 0) {
-      damaged.resize(rng.Below(whole.size()));
+      damaged.resize(rng.UniformInt(whole.size()));
     } else {
-      damaged[rng.Below(whole.size())] ^= char(1 << rng.Below(8));
+      damaged[rng.UniformInt(whole.size())] ^= char(1 << rng.UniformInt(8));
     }
     try {
       Read(damaged);

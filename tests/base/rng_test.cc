@@ -91,7 +91,7 @@ TEST(Rng, BelowHitsEveryValueEquallyOften) {
   Rng rng(7, "test");
   constexpr int n = 10000, k = 10;
   std::array<int, k> counts{};
-  for (int i = 0; i < n; ++i) ++counts.at(rng.Below(k));
+  for (int i = 0; i < n; ++i) ++counts.at(rng.UniformInt(k));
   for (const int count : counts) EXPECT_NEAR(count, n / k, 5 * std::sqrt(n * 0.1 * 0.9));
 }
 
@@ -103,7 +103,7 @@ TEST(Rng, BelowIsUnbiasedForRangesNearTheWordSize) {
   constexpr int n = 3000;
   std::array<int, 3> counts{};
   for (int i = 0; i < n; ++i) {
-    const std::uint64_t x = rng.Below(range);
+    const std::uint64_t x = rng.UniformInt(range);
     ASSERT_LT(x, range);
     ++counts[x % 3];
   }
@@ -112,23 +112,23 @@ TEST(Rng, BelowIsUnbiasedForRangesNearTheWordSize) {
 
 TEST(Rng, BelowOneIsZero) {
   Rng rng(9, "test");
-  EXPECT_EQ(rng.Below(1), 0u);
+  EXPECT_EQ(rng.UniformInt(1), 0u);
 }
 
 TEST(Rng, GoesOnFromAStateThatWasKept) {
   Rng rng(10, "test"), other(11, "other");
   for (int i = 0; i < 400; ++i) rng.Bits();  // past one block of 312 words
   MemoryVisitor kept;
-  rng.Visit(kept, "rng");
+  rng.Serialize(kept, "rng");
   kept.load = true;
-  other.Visit(kept, "rng");
+  other.Serialize(kept, "rng");
   for (int i = 0; i < 700; ++i) ASSERT_EQ(rng.Bits(), other.Bits()) << "draw " << i;
 }
 
 TEST(Rng, SavingDoesNotDisturbTheStream) {
   Rng a(12, "test"), b(12, "test");
   MemoryVisitor kept;
-  a.Visit(kept, "rng");
+  a.Serialize(kept, "rng");
   EXPECT_EQ(a.Bits(), b.Bits());
 }
 

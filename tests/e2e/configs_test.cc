@@ -30,7 +30,7 @@ TEST_P(PaperConfigs, EveryRunOfTheFirstSeedMakesTwoUpdates) {
     std::vector<Episode> episodes;
     for (int update = 0; update < 2; ++update) {
       algorithm->Collect(env, episodes);
-      for (const Ratio& x : algorithm->Update()) {
+      for (const SumAndCount& x : algorithm->Update()) {
         EXPECT_TRUE(std::isfinite(x.Value())) << job.command;
       }
     }

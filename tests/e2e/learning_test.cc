@@ -38,7 +38,7 @@ struct Trained {
     while (env.TotalSteps() < steps) {
       algorithm.Collect(env, episodes);
       std::vector<double>& stats = updates.emplace_back();
-      for (const Ratio& ratio : algorithm.Update()) stats.push_back(ratio.Value());
+      for (const SumAndCount& ratio : algorithm.Update()) stats.push_back(ratio.Value());
     }
   }
   double First() const { return MeanReturn(episodes, 0, 20); }

@@ -232,8 +232,8 @@ TEST_F(PolicyCommands, ForwardWritesWhatTheNetworksSay) {
   value("action.sigma.b") << 0, 1;
   Normalizer normalizer(11);
   SaveCheckpoint(dir_ / "x.ckpt", {{"config", ToToml(config)}}, *policy, [&](StateVisitor& v) {
-    policy->Visit(v);
-    normalizer.Visit(v);
+    policy->Serialize(v);
+    normalizer.Serialize(v);
   });
   // Columns in any order; an option of the episode before an initial state counts for nothing.
   WriteFileAtomically(dir_ / "in.csv",

@@ -70,7 +70,7 @@ TEST_P(EveryTask, SavingChangesNothing) {
     Play(*task, 37);
   }
   SavingVisitor visitor;
-  saved.env->Visit(visitor, "worker0.");
+  saved.env->Serialize(visitor, "worker0.");
   EXPECT_TRUE(Play(saved, 300) == Play(untouched, 300));
 }
 
@@ -83,9 +83,9 @@ TEST_P(EveryTask, ALoadedStateGoesOnAsTheSavedOne) {
   for (int i = 0; i < 200 && saved.env->data().nefc == 0; ++i) Play(saved, 1);
   for (int episode = 0; episode < 2; ++episode) loaded.Reset();  // another one than the saved one
   SavingVisitor visitor;
-  saved.env->Visit(visitor, "worker0.");
+  saved.env->Serialize(visitor, "worker0.");
   LoadingVisitor loading(visitor);
-  loaded.env->Visit(loading, "worker0.");
+  loaded.env->Serialize(loading, "worker0.");
   loaded.resets = saved.resets;
   loaded.actions = saved.actions;
   EXPECT_TRUE(Play(saved, 1000) == Play(loaded, 1000));

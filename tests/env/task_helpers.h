@@ -96,7 +96,7 @@ inline std::string TestName(std::string id) {
   return id;
 }
 
-/// Keeps what a Visit shows.
+/// Keeps what a Serialize shows.
 class SavingVisitor final : public StateVisitor {
  public:
   void Matrix(std::string_view name, Mat&) override { throw Error("matrix " + std::string(name)); }

@@ -37,8 +37,8 @@ struct State {
 
   StateWalk Walk() {
     return [this](StateVisitor& v) {
-      algorithm->Visit(v);
-      env.Visit(v);
+      algorithm->Serialize(v);
+      env.Serialize(v);
     };
   }
 

@@ -49,7 +49,7 @@ void Run(const std::string& task, const std::string& method, Fidelity fidelity, 
   env.Reset();
   for (int iteration = 0; iteration < 2; ++iteration) {
     algorithm->Collect(env, episodes);
-    const std::vector<Ratio>& stats = algorithm->Update();
+    const std::vector<SumAndCount>& stats = algorithm->Update();
     const std::vector<std::string> columns = algorithm->StatNames();
     ASSERT_EQ(columns.size(), stats.size());
     for (std::size_t i = 0; i < stats.size(); ++i) {

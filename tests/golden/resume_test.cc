@@ -58,7 +58,9 @@ class KillingEnv final : public Env {
     killer_();
     return env_->Step(a, obs);
   }
-  void Visit(StateVisitor& v, const std::string& prefix) override { env_->Visit(v, prefix); }
+  void Serialize(StateVisitor& v, const std::string& prefix) override {
+    env_->Serialize(v, prefix);
+  }
 
  private:
   std::unique_ptr<Env> env_;
@@ -72,7 +74,7 @@ class KilledAlgorithm final : public Algorithm {
   KilledAlgorithm(std::unique_ptr<Algorithm> algorithm, Killer& killer, long delay)
       : algorithm_(std::move(algorithm)), killer_(killer), delay_(delay) {}
 
-  const std::vector<Ratio>& Update() override {
+  const std::vector<SumAndCount>& Update() override {
     if (!killer_.Due()) return algorithm_->Update();
     sigevent event{};
     event.sigev_notify = SIGEV_SIGNAL;
@@ -81,7 +83,7 @@ class KilledAlgorithm final : public Algorithm {
     Check(::timer_create(CLOCK_MONOTONIC, &event, &timer) == 0, "no timer");
     const itimerspec when{{0, 0}, {0, delay_}};
     Check(::timer_settime(timer, 0, &when, nullptr) == 0, "no timer");
-    const std::vector<Ratio>& stats = algorithm_->Update();
+    const std::vector<SumAndCount>& stats = algorithm_->Update();
     ::raise(SIGKILL);  // the update was faster
     return stats;
   }
@@ -89,7 +91,7 @@ class KilledAlgorithm final : public Algorithm {
   void Collect(VecEnv& env, std::vector<Episode>& e) override { algorithm_->Collect(env, e); }
   std::vector<std::string> StatNames() const override { return algorithm_->StatNames(); }
   std::vector<Param*> Params() override { return algorithm_->Params(); }
-  void Visit(StateVisitor& v) override { algorithm_->Visit(v); }
+  void Serialize(StateVisitor& v) override { algorithm_->Serialize(v); }
   int NumOptions() const override { return algorithm_->NumOptions(); }
   void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
                     Mat& P) override {
@@ -121,12 +123,12 @@ void TrainUntilKilled(const RunConfig& config, const std::filesystem::path& dir,
                       int kill) {
   Rng rng(17, Concat("kill", static_cast<int>(moment), '.', kill));
   const auto steps = static_cast<std::uint64_t>(kRollout * config.workers);  // of an iteration
-  Killer killer(moment == Moment::kRollout  ? 1 + rng.Below(kMaxAhead * steps)
-                : moment == Moment::kUpdate ? 1 + rng.Below(kMaxAhead)
+  Killer killer(moment == Moment::kRollout  ? 1 + rng.UniformInt(kMaxAhead * steps)
+                : moment == Moment::kUpdate ? 1 + rng.UniformInt(kMaxAhead)
                 : kill == 0                 ? 1
                                             : 2);
   const long delay =
-      1 + static_cast<long>(rng.Below(200'000));  // [ns] an update takes 30 to 400 us
+      1 + static_cast<long>(rng.UniformInt(200'000));  // [ns] an update takes 30 to 400 us
   RunParts parts = PartsOf(config);
   RunHooks hooks;
   const RunParts real = parts;

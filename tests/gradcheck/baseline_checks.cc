@@ -128,7 +128,8 @@ void PpoProblem::Ask(const Batch& batch, const std::string& tensor, Says& x) {
 
 Wide PpoProblem::Loss(int stage, const Batch& batch, const Says& now, const Says& base) {
   const Index B = batch.Size();
-  const Stream& stream = Has(setup_.method, "dac_") && stage == 0 ? batch.high : batch.low;
+  const StageTargets& stream =
+      Has(setup_.method, "dac_") && stage == 0 ? batch.option : batch.action;
   Wide sum = 0;
   for (Index b = 0; b < B; ++b) {
     const Wide r = std::exp(LogProb(stage, batch, now, b) - stream.logp_old(b));
@@ -179,7 +180,8 @@ void PpoProblem::Fill() {
   Says x;
   Ask(batch_, "", x);
   for (int stage = 0; stage < int(algo_->StageNames().size()); ++stage) {
-    Stream& stream = algo_->StageNames().size() == 2 && stage == 0 ? batch_.high : batch_.low;
+    StageTargets& stream =
+        algo_->StageNames().size() == 2 && stage == 0 ? batch_.option : batch_.action;
     for (int b = 0; b < kB; ++b) {
       Place(stream, b, double(LogProb(stage, batch_, x, b)),
             double(Prediction(stage, batch_, x, b)));
@@ -368,7 +370,7 @@ class PpocProblem final : public OptionProblem {
           omega = base.beta(i, b) * base.pi(o, b) / PiHat(base, b, i, o, o == i);
         }
       }
-      sum -= omega * std::log(now.pi(o, b)) * batch.low.adv_hat(b);
+      sum -= omega * std::log(now.pi(o, b)) * batch.action.adv_hat(b);
       sum += kEntropyWeight * (now.pi.col(b).array() * now.pi.col(b).array().log()).sum();
     }
     return sum / batch.Size();
@@ -388,7 +390,7 @@ class OcProblem final : public OptionProblem {
     for (int b = 0; b < kN * (kT - 1); ++b) batch_.mask(b) = !batch_.init[std::size_t(b + kN)];
     batch_.s_end = RandomMat(kS, kN, rng_);
     Targets targets(*this);
-    algo_->Visit(targets);
+    algo_->Serialize(targets);
     CheckLoss(0);
   }
 

@@ -19,15 +19,15 @@ Comparison Square(double g0, double g1, Expect expect = Expect::kGradient) {
 }
 
 TEST(GradCheck, PassesTheTrueGradient) {
-  const Verdict verdict = Judge(Square(6, 1));
+  const Verdict verdict = RewardAndEnd(Square(6, 1));
   EXPECT_TRUE(verdict.Passed()) << verdict.largest_error;
   EXPECT_EQ(verdict.entries, 2u);
   EXPECT_EQ(verdict.largest_gradient, 6);
 }
 
 TEST(GradCheck, MeasuresTheErrorRelativeToTheLargerOfTheTwo) {
-  EXPECT_NEAR(Judge(Square(8, 1)).largest_error, 2.0 / 8, 1e-8);
-  EXPECT_NEAR(Judge(Square(4, 1)).largest_error, 2.0 / 6, 1e-8);
+  EXPECT_NEAR(RewardAndEnd(Square(8, 1)).largest_error, 2.0 / 8, 1e-8);
+  EXPECT_NEAR(RewardAndEnd(Square(4, 1)).largest_error, 2.0 / 6, 1e-8);
 }
 
 TEST(GradCheck, MeasuresSmallEntriesAgainstTheWholeStage) {
@@ -35,34 +35,35 @@ TEST(GradCheck, MeasuresSmallEntriesAgainstTheWholeStage) {
   Rng rng(2, "test");
   Mat x = Mat::Ones(1, 1), y = x, one = x, twice = Mat::Constant(1, 1, 2e-6);
   const auto loss = [&] { return x(0) + 1e-6 * y(0); };
-  EXPECT_NEAR(Judge(Compare({{"x", x, one, loss}, {"y", y, twice, loss}}, rng)).largest_error, 1e-3,
-              1e-6);
+  EXPECT_NEAR(
+      RewardAndEnd(Compare({{"x", x, one, loss}, {"y", y, twice, loss}}, rng)).largest_error, 1e-3,
+      1e-6);
 }
 
 TEST(GradCheck, CatchesOnePercentAndAWrongSign) {
-  EXPECT_FALSE(Judge(Square(6 * 1.01, 1)).Passed());
-  EXPECT_FALSE(Judge(Square(6, -1)).Passed());
-  EXPECT_FALSE(Judge(WithPlantedError(Square(6, 1), 0, 1.01)).Passed());
+  EXPECT_FALSE(RewardAndEnd(Square(6 * 1.01, 1)).Passed());
+  EXPECT_FALSE(RewardAndEnd(Square(6, -1)).Passed());
+  EXPECT_FALSE(RewardAndEnd(WithPlantedError(Square(6, 1), 0, 1.01)).Passed());
 }
 
 TEST(GradCheck, FailsATensorWithoutAnyGradient) {
-  const Verdict verdict = Judge(Square(0, 0));
+  const Verdict verdict = RewardAndEnd(Square(0, 0));
   EXPECT_EQ(verdict.largest_error, std::numeric_limits<double>::infinity());
   EXPECT_EQ(verdict.worst, "x");
 }
 
 TEST(GradCheck, FailsWhatIsNotANumber) {
-  EXPECT_FALSE(Judge(Square(6, std::numeric_limits<double>::quiet_NaN())).Passed());
+  EXPECT_FALSE(RewardAndEnd(Square(6, std::numeric_limits<double>::quiet_NaN())).Passed());
 }
 
 TEST(GradCheck, WantsDetachedTensorsExactlyZero) {
-  EXPECT_TRUE(Judge(Square(0, 0, Expect::kDetached)).Passed());
-  EXPECT_FALSE(Judge(Square(0, 1e-300, Expect::kDetached)).Passed());
+  EXPECT_TRUE(RewardAndEnd(Square(0, 0, Expect::kDetached)).Passed());
+  EXPECT_FALSE(RewardAndEnd(Square(0, 1e-300, Expect::kDetached)).Passed());
 }
 
 TEST(GradCheck, AllowsRoundingWhereTheLossCannotMove) {
-  EXPECT_TRUE(Judge(Square(0, 1e-13, Expect::kShift)).Passed());
-  EXPECT_FALSE(Judge(Square(0, 1e-11, Expect::kShift)).Passed());
+  EXPECT_TRUE(RewardAndEnd(Square(0, 1e-13, Expect::kShift)).Passed());
+  EXPECT_FALSE(RewardAndEnd(Square(0, 1e-11, Expect::kShift)).Passed());
 }
 
 TEST(GradCheck, ComparesAsManyEntriesAsAskedTheLargestAmongThem) {
@@ -72,7 +73,7 @@ TEST(GradCheck, ComparesAsManyEntriesAsAskedTheLargestAmongThem) {
   const auto loss = [&] { return x.squaredNorm(); };
   const Comparison comparison = Compare({{"x", x, g, loss}}, rng, 21);
   EXPECT_EQ(comparison[0].analytic.size(), 21u);
-  EXPECT_NEAR(Judge(comparison).largest_error, 0.5, 1e-6);
+  EXPECT_NEAR(RewardAndEnd(comparison).largest_error, 0.5, 1e-6);
 }
 
 TEST(GradCheck, LeavesTheValuesAsTheyWere) {
@@ -89,7 +90,7 @@ TEST(GradCheck, MergesTensorsByName) {
   Merge(Square(8, 1), all);
   ASSERT_EQ(all.size(), 1u);
   EXPECT_EQ(all[0].largest, 8);
-  EXPECT_NEAR(Judge(all).largest_error, 2.0 / 8, 1e-8);
+  EXPECT_NEAR(RewardAndEnd(all).largest_error, 2.0 / 8, 1e-8);
 }
 
 }  // namespace

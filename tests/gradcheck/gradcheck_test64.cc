@@ -12,7 +12,7 @@ namespace {
 class EveryCheck : public testing::TestWithParam<NamedCheck> {};
 
 TEST_P(EveryCheck, AgreesWithCentralDifferences) {
-  const Verdict verdict = Judge(GetParam().run());
+  const Verdict verdict = RewardAndEnd(GetParam().run());
   EXPECT_LT(verdict.largest_error, kTolerance) << verdict.worst;
   EXPECT_GT(verdict.entries, 0u);
 }
@@ -21,7 +21,8 @@ TEST_P(EveryCheck, CatchesAnErrorOfOnePercentInAnyTensor) {
   const Comparison comparison = GetParam().run();
   for (std::size_t i = 0; i < comparison.size(); ++i) {
     if (comparison[i].expect != Expect::kGradient) continue;
-    EXPECT_FALSE(Judge(WithPlantedError(comparison, i, 1.01)).Passed()) << comparison[i].name;
+    EXPECT_FALSE(RewardAndEnd(WithPlantedError(comparison, i, 1.01)).Passed())
+        << comparison[i].name;
   }
 }
 

@@ -14,7 +14,7 @@ namespace {
 /// A check that throws, as where a loss is not that of the specification, fails like another.
 o2v::Verdict Run(const o2v::NamedCheck& check) {
   try {
-    return o2v::Judge(check.run());
+    return o2v::RewardAndEnd(check.run());
   } catch (const o2v::Error& e) {
     o2v::Verdict verdict;
     verdict.largest_error = std::numeric_limits<double>::infinity();

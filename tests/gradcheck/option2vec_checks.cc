@@ -70,8 +70,8 @@ Option2VecProblem::Option2VecProblem(const Setup& setup, std::uint64_t seed)
   const OptionPass pass = Options(W_o);
   for (int b = 0; b < kB; ++b) {
     const std::size_t i = std::size_t(b);
-    Place(batch_.low, b, logp(b), q(fed[i], b));
-    Place(batch_.high, b, pass.log_P(batch_.o[i], b), pass.P.col(b).dot(q.col(b)));
+    Place(batch_.action, b, logp(b), q(fed[i], b));
+    Place(batch_.option, b, pass.log_P(batch_.o[i], b), pass.P.col(b).dot(q.col(b)));
   }
   VisitRelus();
 
@@ -166,8 +166,8 @@ double Option2VecProblem::OptionObjective(const OptionPass& base, const Mat& W_o
     logp(b) = now.log_P(batch_.o[std::size_t(b)], b);
     v(b) = P.col(b).dot(q.col(b));
   }
-  ClippedSurrogate(logp, batch_.high.logp_old, batch_.high.adv_hat, kClip, terms, scratch);
-  ValueLoss(v, batch_.high.ret, terms, scratch);
+  ClippedSurrogate(logp, batch_.option.logp_old, batch_.option.adv_hat, kClip, terms, scratch);
+  ValueLoss(v, batch_.option.ret, terms, scratch);
   CategoricalEntropy(now.log_P, now.P, H);
   terms.entropy = H.mean();
   return terms.surrogate - kEntropyWeight * terms.entropy + terms.value;

@@ -94,7 +94,7 @@ Problem::Problem(const Setup& setup, std::uint64_t seed)
 
 bool Problem::IsClipped(int b) { return b % 8 == 3 || b % 8 == 4; }
 
-void Problem::Place(Stream& stream, int b, double log_prob, double value) {
+void Problem::Place(StageTargets& stream, int b, double log_prob, double value) {
   constexpr double kRatios[] = {0.6, 0.9, 1.1, 1.5};  // outside and inside 1 -+ 0.2
   stream.logp_old(b) = log_prob - std::log(kRatios[b % 4] * rng_.Uniform(0.98, 1.02));
   stream.adv_hat(b) = (b / 4 % 2 ? -1 : 1) * rng_.Uniform(0.5, 2);
@@ -200,7 +200,7 @@ std::vector<int> ShuffledOptions(std::size_t n, int K, Rng& rng) {
   std::vector<int> o(n);
   for (std::size_t i = 0; i < n; ++i) {
     o[i] = int(i) % K;
-    std::swap(o[i], o[rng.Below(i + 1)]);
+    std::swap(o[i], o[rng.UniformInt(i + 1)]);
   }
   return o;
 }

@@ -26,8 +26,8 @@ struct State {
   }
   StateWalk Walk() {
     return [this](StateVisitor& v) {
-      algorithm.Visit(v);
-      env.Visit(v);
+      algorithm.Serialize(v);
+      env.Serialize(v);
     };
   }
 
@@ -125,7 +125,7 @@ TEST_F(Checkpoint, WritesMatricesRowByRow) {
   Mat x(2, 3);
   x << 1, 2, 3, 4, 5, 6;
   SaveCheckpoint(path_, {}, state.algorithm, [&](StateVisitor& v) {
-    state.algorithm.Visit(v);
+    state.algorithm.Serialize(v);
     v.Matrix("x", x);
   });
   const auto [header, data] = Split(ReadFile(path_));
@@ -139,8 +139,8 @@ TEST_F(Checkpoint, DoesNotTakeTwoArraysOfOneName) {
   State state(1);
   EXPECT_THROW(SaveCheckpoint(path_, {}, state.algorithm,
                               [&](StateVisitor& v) {
-                                state.algorithm.Visit(v);
-                                state.algorithm.Visit(v);
+                                state.algorithm.Serialize(v);
+                                state.algorithm.Serialize(v);
                               }),
                Error);
 }
@@ -159,8 +159,8 @@ TEST_F(Checkpoint, OfAnotherRunShapeIsRefusedWithoutATrace) {
        {true, false}) {  // the run has one array more, or all of the environment less
     EXPECT_THROW(LoadCheckpoint(path_, loaded.algorithm,
                                 [&](StateVisitor& v) {
-                                  loaded.algorithm.Visit(v);
-                                  if (extra) loaded.env.Visit(v), v.Doubles("more", more, 3);
+                                  loaded.algorithm.Serialize(v);
+                                  if (extra) loaded.env.Serialize(v), v.Doubles("more", more, 3);
                                 }),
                  Error);
     EXPECT_EQ(loaded.algorithm.Params()[0]->value, before);

@@ -27,7 +27,7 @@ class DivergingEnv final : public Env {
     result.reward += 100 * task_;
     return result;
   }
-  void Visit(StateVisitor& v, const std::string& prefix) override { env_.Visit(v, prefix); }
+  void Serialize(StateVisitor& v, const std::string& prefix) override { env_.Serialize(v, prefix); }
 
  private:
   FakeEnv env_;

@@ -41,8 +41,8 @@ TEST_F(Evaluation, ChangesNeitherLearnerNorStatistics) {
   TestFolder dir;
   const auto save = [&] {
     SaveCheckpoint(dir / "x", {}, algorithm_, [&](StateVisitor& v) {
-      algorithm_.Visit(v);
-      normalizer_.Visit(v);
+      algorithm_.Serialize(v);
+      normalizer_.Serialize(v);
     });
     return ReadFile(dir / "x");
   };
@@ -96,7 +96,7 @@ TEST_F(Evaluation, ClipsToTheRangeOfTheTaskWhateverThatIs) {
       actions.insert(a[0]);
       return env.Step(a, obs);
     }
-    void Visit(StateVisitor&, const std::string&) override {}
+    void Serialize(StateVisitor&, const std::string&) override {}
     EnvSpec spec;
     FakeEnv env;
     std::set<double> actions;

@@ -35,7 +35,7 @@ class FakeEnv final : public Env {
     Observe(obs);
     return {-x_ * x_, std::abs(x_) > 2, steps_ == spec_.time_limit};
   }
-  void Visit(StateVisitor& v, const std::string& prefix) override {
+  void Serialize(StateVisitor& v, const std::string& prefix) override {
     v.Double(prefix + "x", x_);
     v.Int(prefix + "steps", steps_);
   }
@@ -72,7 +72,7 @@ class FakeAlgorithm : public Algorithm {
       reward_ += transition_.r.sum();
     }
   }
-  const std::vector<Ratio>& Update() override {
+  const std::vector<SumAndCount>& Update() override {
     if (in_update) in_update();
     const double nudge = 0.01 * reward_ * rng_.Normal();
     W_.value.array() += static_cast<Real>(nudge);
@@ -82,10 +82,10 @@ class FakeAlgorithm : public Algorithm {
   }
   std::vector<std::string> StatNames() const override { return {"reward", "nudge"}; }
   std::vector<Param*> Params() override { return {&W_, &b_}; }
-  void Visit(StateVisitor& v) override {
+  void Serialize(StateVisitor& v) override {
     for (Param* p : Params()) v.Matrix(p->name, p->value);
     v.Int("updates", updates_);
-    rng_.Visit(v, "policy_rng");
+    rng_.Serialize(v, "policy_rng");
   }
 
   int NumOptions() const override { return 2; }
@@ -123,7 +123,7 @@ class FakeAlgorithm : public Algorithm {
   Param W_, b_;
   Transition transition_;
   double reward_ = 0;
-  std::vector<Ratio> ratios_;
+  std::vector<SumAndCount> ratios_;
   std::int64_t updates_ = 0;
 };
 

@@ -23,11 +23,11 @@ template <typename Use>
 void ForEachDamage(const std::string& text, Use&& use) {
   Rng rng(11, "damage");
   for (int i = 0; i < 2 * kDamages; ++i) {
-    const std::size_t at = rng.Below(text.size());
+    const std::size_t at = rng.UniformInt(text.size());
     std::string damaged = text.substr(0, at);
     std::string what = Concat("cut at byte ", at);
     if (i >= kDamages) {
-      const int bit = static_cast<int>(rng.Below(8));
+      const int bit = static_cast<int>(rng.UniformInt(8));
       damaged = text;
       damaged[at] = static_cast<char>(damaged[at] ^ (1 << bit));
       what = Concat("bit ", bit, " of byte ", at);
@@ -59,8 +59,8 @@ struct State {
   }
   StateWalk Walk() {
     return [this](StateVisitor& v) {
-      algorithm.Visit(v);
-      env.Visit(v);
+      algorithm.Serialize(v);
+      env.Serialize(v);
     };
   }
   /// All state as text.
@@ -158,14 +158,14 @@ TEST(DamagedLog, IsRefusedOrLosesOnlyWhatIsCutAnyway) {
   for (int i = 0; i < 100; ++i) log.Row({std::to_string(i), std::to_string(i * i)});
   log.Flush();
   const std::string kept = ReadFile(path);
-  log.Visit(state, "log");
+  log.Serialize(state, "log");
   for (int i = 0; i < 100; ++i) log.Row({"1", "2"});
   log.Flush();
   int accepted = 0;
   ForEachDamage(ReadFile(path), [&](const std::string& damaged, const std::string& what) {
     Write(path, damaged);
     CsvLog resumed(path, "step,return");
-    resumed.Visit(state, "log");
+    resumed.Serialize(state, "log");
     if (Refuses([&] { resumed.Resume(); })) {
       EXPECT_TRUE(ReadFile(path) == damaged) << what;
     } else {

@@ -37,14 +37,14 @@ class Logs : public testing::Test {
     log.Create();
     log.Row({"1", "0.5"});
     log.Flush();
-    log.Visit(checkpoint_, "log");
+    log.Serialize(checkpoint_, "log");
     log.Row({"2", "0.25"});
     log.Flush();
   }
   void Resume(const std::string& header = "step,x") {
     CsvLog log(path_, header);
     checkpoint_.StartWriting();
-    log.Visit(checkpoint_, "log");
+    log.Serialize(checkpoint_, "log");
     log.Resume();
     log.Row({"3", "7"});
     log.Flush();
@@ -89,7 +89,7 @@ TEST(RunLogs, WriteTheirColumns) {
                    .length = 7,
                    .terminated = true,
                    .truncated = false});
-  logs.AddUpdate(2048, std::vector<Ratio>{{3, 2}, {1e-9, 1}});
+  logs.AddUpdate(2048, std::vector<SumAndCount>{{3, 2}, {1e-9, 1}});
   logs.AddEval(2048, 0, 3);
   logs.Flush();
   EXPECT_EQ(ReadFile(dir / "episodes.csv"),
@@ -118,7 +118,7 @@ std::string UpdatesOf(int seen) {
   RunLogs first(dir / "", columns, /*evals=*/false), second(dir / "", columns, /*evals=*/false);
   RunLogs* logs = &first;
   MemoryVisitor checkpoint;
-  const std::vector<std::pair<std::int64_t, std::vector<Ratio>>> updates = {
+  const std::vector<std::pair<std::int64_t, std::vector<SumAndCount>>> updates = {
       {2048, {{6, 2}, {2048, 3}}},  // a row of its own
       {4095, {{1, 1}, {2, 0}}},     // 2047 steps: none yet
       {4100, {{9, 3}, {40, 1}}},    // 2052 steps: row of both
@@ -129,11 +129,11 @@ std::string UpdatesOf(int seen) {
   for (int i = 0; i < int(updates.size()); ++i) {
     if (i == seen) {
       first.Flush();
-      first.Visit(checkpoint);
-      first.AddUpdate(9999, std::vector<Ratio>{{-1, 1}, {-1, 1}});
+      first.Serialize(checkpoint);
+      first.AddUpdate(9999, std::vector<SumAndCount>{{-1, 1}, {-1, 1}});
       first.Flush();
       checkpoint.load = true;
-      second.Visit(checkpoint);
+      second.Serialize(checkpoint);
       second.Resume();
       logs = &second;
     }
@@ -157,7 +157,7 @@ TEST(RunLogs, RefuseAnUpdateOfOtherColumns) {
   TestFolder dir;
   RunLogs logs(dir / "", {"loss"}, /*evals=*/false);
   logs.Create();
-  EXPECT_THROW(logs.AddUpdate(1, std::vector<Ratio>(2)), Error);
+  EXPECT_THROW(logs.AddUpdate(1, std::vector<SumAndCount>(2)), Error);
 }
 
 TEST(RunLogs, WriteNoEvaluationsWhenOff) {

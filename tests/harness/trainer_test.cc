@@ -332,8 +332,8 @@ TEST_F(Trainer, NamesWindowsLineEndsOfAConfig) {
 
 TEST_F(Trainer, StopsInTheMiddleOfAnEvaluationAndGoesOn) {
   Start("whole");
-  // Asked after each of four iterations; then before each step of the evaluation after the fifth,
-  // of two episodes of at most 7 steps.
+  // QueryCache after each of four iterations; then before each step of the evaluation after the
+  // fifth, of two episodes of at most 7 steps.
   for (int moment = 5; moment <= 8; ++moment) {
     const std::string name = std::to_string(moment);
     int asked = 0;
@@ -414,7 +414,9 @@ TEST_F(Trainer, KeepsWhatADivergedRunHas) {
       if (--left == 0) throw DivergedError("bad qacc");
       return env.Step(a, obs);
     }
-    void Visit(StateVisitor& v, const std::string& prefix) override { env.Visit(v, prefix); }
+    void Serialize(StateVisitor& v, const std::string& prefix) override {
+      env.Serialize(v, prefix);
+    }
     int& left;
     FakeEnv env;
   };
@@ -447,7 +449,7 @@ class SpoiledAlgorithm final : public FakeAlgorithm {
   SpoiledAlgorithm(const EnvSpec& spec, std::uint64_t seed, What what, double value)
       : FakeAlgorithm(spec, seed), what_(what), value_(value) {}
 
-  const std::vector<Ratio>& Update() override {
+  const std::vector<SumAndCount>& Update() override {
     stats_ = FakeAlgorithm::Update();
     if (--left_ == 0) {
       if (what_ == What::kStatistic) stats_[1].sum = value_;
@@ -460,7 +462,7 @@ class SpoiledAlgorithm final : public FakeAlgorithm {
   What what_;
   double value_;
   int left_ = 10;  // the update at step 100, after three checkpoints
-  std::vector<Ratio> stats_;
+  std::vector<SumAndCount> stats_;
 };
 
 TEST_F(Trainer, AnUpdateThatIsNotFiniteIsNeitherLoggedNorSaved) {
@@ -513,7 +515,9 @@ TEST_F(Trainer, RewardsAndObservationsThatOverflowDiverge) {
       obs[0] += observation;
       return {result.reward + reward, false, result.truncated};
     }
-    void Visit(StateVisitor& v, const std::string& prefix) override { env.Visit(v, prefix); }
+    void Serialize(StateVisitor& v, const std::string& prefix) override {
+      env.Serialize(v, prefix);
+    }
     double reward, observation;
     FakeEnv env;
   };

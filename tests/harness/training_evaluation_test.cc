@@ -109,7 +109,9 @@ TEST_F(TrainingEvaluation, IsOnTheTaskOfTheMoment) {
       result.reward += 1000 * task;
       return result;
     }
-    void Visit(StateVisitor& v, const std::string& prefix) override { env.Visit(v, prefix); }
+    void Serialize(StateVisitor& v, const std::string& prefix) override {
+      env.Serialize(v, prefix);
+    }
     FakeEnv env;
     int task;
   };

@@ -25,8 +25,8 @@ class NumberedEnv final : public Env {
     return result;
   }
   /// A state of its own on each task: it cannot be loaded on the other one.
-  void Visit(StateVisitor& v, const std::string& prefix) override {
-    env_.Visit(v, prefix + "task" + std::to_string(task_) + ".");
+  void Serialize(StateVisitor& v, const std::string& prefix) override {
+    env_.Serialize(v, prefix + "task" + std::to_string(task_) + ".");
   }
 
  private:

@@ -153,9 +153,9 @@ TEST(Adam, GoesOnFromAStateThatWasKept) {
   };
   for (int i = 0; i < 3; ++i) step(p, adam, 1);
   MemoryVisitor kept;
-  adam.Visit(kept);
+  adam.Serialize(kept);
   kept.load = true;
-  other.Visit(kept);
+  other.Serialize(kept);
   q.x.value = p.x.value;
   step(p, adam, -2);
   step(q, other, -2);

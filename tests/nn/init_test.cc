@@ -75,9 +75,9 @@ TEST(Initialiser, DrawsFromItsStreamAndWithoutOneNothing) {
   EXPECT_TRUE(blank.isZero(0));
 }
 
-TEST(Body, StartsOrthogonalWithZeroBiases) {
+TEST(MlpTrunk, StartsOrthogonalWithZeroBiases) {
   Rng rng(6, "test");
-  Body body("net", 5, 8, Activation::kTanh, rng);
+  MlpTrunk body("net", 5, 8, Activation::kTanh, rng);
   const Mat& W = body.layer0.W.value;
   EXPECT_LT(Distance(W.transpose() * W, Mat::Identity(5, 5)), 1e-6);
   EXPECT_TRUE(body.layer0.b.value.isZero());

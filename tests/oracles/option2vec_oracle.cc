@@ -34,11 +34,11 @@ void ReadBatch(const json& file, Batch& batch) {
   batch.o_prev = OracleInts(given.at("o_prev"), batch.Size(), K);
   if (Released(file)) batch.init = OracleFlags(given.at("flag_update"), batch.Size());
   const MatD log_P_old = OracleArray(given.at("log_P_old"));
-  batch.high.logp_old.resize(batch.Size());
+  batch.option.logp_old.resize(batch.Size());
   for (Index b = 0; b < batch.Size(); ++b) {
-    batch.high.logp_old(b) = static_cast<Real>(log_P_old(b, batch.o[std::size_t(b)]));
+    batch.option.logp_old(b) = static_cast<Real>(log_P_old(b, batch.o[std::size_t(b)]));
   }
-  batch.low.logp_old = OracleArray(given.at("logp_low_old")).cast<Real>();
+  batch.action.logp_old = OracleArray(given.at("logp_low_old")).cast<Real>();
 }
 
 /// The file has a sample's two tokens side by side, the network has them in two blocks of columns.
@@ -86,9 +86,9 @@ void MaskedPass(Algorithm& option2vec, const Batch& batch, const FixedDraws& dra
     one.s = batch.s.col(b);
     one.o_prev = {batch.o_prev[row]};
     one.init = {batch.init[row]};
-    one.high.logp_old(0) = 0;
-    one.high.adv_hat(0) = 1;
-    one.high.ret(0) = R;
+    one.option.logp_old(0) = 0;
+    one.option.adv_hat(0) = 1;
+    one.option.ret(0) = R;
     FixedDraws mine;
     mine.o = {draws.o[row]};
     for (const Mat& mask : draws.dropout) {
@@ -154,7 +154,7 @@ void ForwardPart(const json& part, const std::string& place, Algorithm& option2v
     MatD ratio(B, 1);
     for (Index b = 0; b < B; ++b) {
       ratio(b) =
-          probabilities(batch.o[std::size_t(b)], b) / std::exp(double(batch.high.logp_old(b)));
+          probabilities(batch.o[std::size_t(b)], b) / std::exp(double(batch.option.logp_old(b)));
     }
     out.Array(place + "ratio_high", ratio, part.at("ratio_high"));
   }
@@ -163,7 +163,7 @@ void ForwardPart(const json& part, const std::string& place, Algorithm& option2v
     GaussianLogProb(batch.a, mu, sigma, logp);
     out.Array(place + "logp_low", logp.cast<double>(), part.at("logp_low"));
     out.Array(place + "ratio_low",
-              (logp - batch.low.logp_old).array().exp().matrix().cast<double>(),
+              (logp - batch.action.logp_old).array().exp().matrix().cast<double>(),
               part.at("ratio_low"));
   }
 }

@@ -54,14 +54,14 @@ void DacBatch(const json& file, Batch& batch) {
     if (given.contains(name)) batch.P_old = OracleArray(given.at(name)).transpose().cast<Real>();
   }
   Check(batch.P_old.cols() == batch.Size(), "no old option probabilities");
-  batch.high.logp_old = OracleArray(given.at("logp_high_old")).cast<Real>();
-  batch.low.logp_old = OracleArray(given.at("logp_low_old")).cast<Real>();
+  batch.option.logp_old = OracleArray(given.at("logp_high_old")).cast<Real>();
+  batch.action.logp_old = OracleArray(given.at("logp_low_old")).cast<Real>();
 }
 
 void SingleStreamBatch(const json& file, Batch& batch) {
   const json& given = file.at("batch");
   ReadOptions(file, batch);
-  batch.low.logp_old = OracleArray(given.at("logp_old")).cast<Real>();
+  batch.action.logp_old = OracleArray(given.at("logp_old")).cast<Real>();
   if (given.contains("stop")) batch.stop = OracleFlags(given.at("stop"), batch.Size());
 }
 

@@ -107,7 +107,7 @@ class MatrixLoader final : public StateVisitor {
 
 void LoadTarget(Algorithm& algorithm, const json& arrays) {
   MatrixLoader loader(arrays, "target.");
-  algorithm.Visit(loader);
+  algorithm.Serialize(loader);
   Check(loader.loaded() == arrays.size(), "target_params: ", loader.loaded(), " of ", arrays.size(),
         " arrays are parameters of the target network");
 }
@@ -128,9 +128,9 @@ bool OwnTargets(const json& file) {
   return method == "oc" || method == "iopg";
 }
 
-/// Stream arrays named with `suffix`; the normalisation of the given advantages is compared.
-void ReadStream(const json& batch, const std::string& suffix, double adv_std_eps, Stream& stream,
-                Comparison& out) {
+/// StageTargets arrays named with `suffix`; the normalisation of the given advantages is compared.
+void ReadStream(const json& batch, const std::string& suffix, double adv_std_eps,
+                StageTargets& stream, Comparison& out) {
   stream.ret = OracleArray(batch.at("ret" + suffix)).cast<Real>();
   stream.adv_hat = OracleArray(batch.at("adv_hat" + suffix)).cast<Real>();
   Vec adv_hat;
@@ -149,10 +149,10 @@ Batch ReadBatch(const json& file, const OracleMethod& method, const Algorithm& a
   batch.o_prev.assign(B, 0);
   batch.init = OracleFlags(given.at("init"), batch.Size());
   if (algorithm.StageNames().size() == 2) {
-    ReadStream(given, "_high", switches.adv_std_eps, batch.high, out);
-    ReadStream(given, "_low", switches.adv_std_eps, batch.low, out);
+    ReadStream(given, "_high", switches.adv_std_eps, batch.option, out);
+    ReadStream(given, "_low", switches.adv_std_eps, batch.action, out);
   } else if (!OwnTargets(file)) {
-    ReadStream(given, "", switches.adv_std_eps, batch.low, out);
+    ReadStream(given, "", switches.adv_std_eps, batch.action, out);
   }
   method.batch(file, batch);
   return batch;

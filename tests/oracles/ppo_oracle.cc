@@ -15,7 +15,7 @@ void ReadSettings(const json& file, Settings& hyper, Switches&) {
 }
 
 void ReadBatch(const json& file, Batch& batch) {
-  batch.low.logp_old = OracleArray(file.at("batch").at("logp_old")).cast<Real>();
+  batch.action.logp_old = OracleArray(file.at("batch").at("logp_old")).cast<Real>();
 }
 
 FixedDraws NoDraws(const json&, const std::string&, std::size_t) { return {}; }
@@ -31,7 +31,7 @@ void Forward(const json& file, Algorithm& ppo, const Batch& batch, Comparison& o
   out.Array("forward.sigma", sigma.col(0).cast<double>(), forward.at("sigma"));
   out.Array("forward.v", v.transpose().cast<double>(), forward.at("v"));
   out.Array("forward.logp", logp.cast<double>(), forward.at("logp"));
-  out.Array("forward.ratio", (logp - batch.low.logp_old).array().exp().matrix().cast<double>(),
+  out.Array("forward.ratio", (logp - batch.action.logp_old).array().exp().matrix().cast<double>(),
             forward.at("ratio"));
 }
 

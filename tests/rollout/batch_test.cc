@@ -19,12 +19,12 @@ Batch Numbered(Index B) {
     batch.o[i] = int(b);
     batch.o_prev[i] = int(b + 1);
     batch.init[i] = b % 2 == 0;
-    batch.high.logp_old(b) = x + 3;
-    batch.high.adv_hat(b) = x + 4;
-    batch.high.ret(b) = x + 5;
-    batch.low.logp_old(b) = x + 6;
-    batch.low.adv_hat(b) = x + 7;
-    batch.low.ret(b) = x + 8;
+    batch.option.logp_old(b) = x + 3;
+    batch.option.adv_hat(b) = x + 4;
+    batch.option.ret(b) = x + 5;
+    batch.action.logp_old(b) = x + 6;
+    batch.action.adv_hat(b) = x + 7;
+    batch.action.ret(b) = x + 8;
     batch.P_old.col(b) << x + 9, x + 10, x + 11;
     batch.stop[i] = b % 3 == 1;
   }
@@ -47,12 +47,12 @@ TEST(Gather, CopiesEveryArrayOfTheSamples) {
     EXPECT_EQ(out.o[i], int(b));
     EXPECT_EQ(out.o_prev[i], int(b + 1));
     EXPECT_EQ(out.init[i], b % 2 == 0);
-    EXPECT_EQ(out.high.logp_old(to), x + 3);
-    EXPECT_EQ(out.high.adv_hat(to), x + 4);
-    EXPECT_EQ(out.high.ret(to), x + 5);
-    EXPECT_EQ(out.low.logp_old(to), x + 6);
-    EXPECT_EQ(out.low.adv_hat(to), x + 7);
-    EXPECT_EQ(out.low.ret(to), x + 8);
+    EXPECT_EQ(out.option.logp_old(to), x + 3);
+    EXPECT_EQ(out.option.adv_hat(to), x + 4);
+    EXPECT_EQ(out.option.ret(to), x + 5);
+    EXPECT_EQ(out.action.logp_old(to), x + 6);
+    EXPECT_EQ(out.action.adv_hat(to), x + 7);
+    EXPECT_EQ(out.action.ret(to), x + 8);
     for (Index k = 0; k < 3; ++k) EXPECT_EQ(out.P_old(k, to), x + 9 + Real(k));
     EXPECT_EQ(out.stop[i], b % 3 == 1);
   }

@@ -79,9 +79,9 @@ TEST(Normalizer, GoesOnFromAStateThatWasKept) {
   Normalizer normalizer(2), other(2);
   normalizer.Update(Data(5, rng));
   MemoryVisitor kept;
-  normalizer.Visit(kept);
+  normalizer.Serialize(kept);
   kept.load = true;
-  other.Visit(kept);
+  other.Serialize(kept);
   const VecD x = Data(1, rng).col(0);
   Vec expected(2), out(2);
   normalizer.Apply(x, expected);

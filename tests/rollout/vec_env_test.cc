@@ -39,7 +39,7 @@ class ScriptedEnv final : public Env {
     return {a[0], end && terminated_, end && truncated_};
   }
 
-  void Visit(StateVisitor& v, const std::string& prefix) override {
+  void Serialize(StateVisitor& v, const std::string& prefix) override {
     v.Int(prefix + "episode", episode_);
     v.Int(prefix + "steps", steps_);
     v.Double(prefix + "noise", noise_);
@@ -105,13 +105,13 @@ TEST(VecEnv, FlagsTheFirstStatesOfEpisodes) {
   Transition t;
   std::vector<Episode> episodes;
   env.Reset();
-  EXPECT_EQ(env.Init(), (std::vector<char>{1, 1, 1}));
+  EXPECT_EQ(env.EpisodeStarts(), (std::vector<char>{1, 1, 1}));
   env.Step(Actions(), t, episodes);
-  EXPECT_EQ(env.Init(), (std::vector<char>{0, 0, 0}));
+  EXPECT_EQ(env.EpisodeStarts(), (std::vector<char>{0, 0, 0}));
   env.Step(Actions(), t, episodes);
-  EXPECT_EQ(env.Init(), (std::vector<char>{1, 0, 0}));
+  EXPECT_EQ(env.EpisodeStarts(), (std::vector<char>{1, 0, 0}));
   env.Step(Actions(), t, episodes);
-  EXPECT_EQ(env.Init(), (std::vector<char>{0, 1, 1}));
+  EXPECT_EQ(env.EpisodeStarts(), (std::vector<char>{0, 1, 1}));
 }
 
 TEST(VecEnv, ReportsTerminationAndTruncationApart) {
@@ -212,11 +212,11 @@ TEST(VecEnv, GoesOnFromAStateThatWasKept) {
   env.Reset();
   for (int i = 0; i < 4; ++i) env.Step(Actions(), t, episodes);
   MemoryVisitor kept;
-  env.Visit(kept);
+  env.Serialize(kept);
   kept.load = true;
-  other.Visit(kept);
+  other.Serialize(kept);
   EXPECT_EQ(other.States(), env.States());
-  EXPECT_EQ(other.Init(), env.Init());
+  EXPECT_EQ(other.EpisodeStarts(), env.EpisodeStarts());
   episodes.clear();
   for (int i = 0; i < 7; ++i) {
     env.Step(Actions(), t, episodes);
@@ -244,7 +244,7 @@ TEST(VecEnv, AChangeOfTaskStartsEpisodesAndKeepsTheRest) {
   VecEnv env = AfterAChangeOfTask(true, 1);
   EXPECT_EQ(env.Spec().time_limit, 9);
   EXPECT_EQ(env.TotalSteps(), 3);
-  EXPECT_EQ(env.Init(), (std::vector<char>{1, 1, 1}));
+  EXPECT_EQ(env.EpisodeStarts(), (std::vector<char>{1, 1, 1}));
   // Three observations of each worker: reset, step, reset on the new task.
   EXPECT_NEAR(env.normalizer().count(), 9 + 1e-4, 1e-12);
   // The first step of the old task belongs to no episode.
@@ -258,9 +258,9 @@ TEST(VecEnv, AChangeOfTaskStartsEpisodesAndKeepsTheRest) {
 }
 
 TEST(VecEnv, AChangeOfTaskCanLookLikeAContinuation) {
-  EXPECT_EQ(AfterAChangeOfTask(false, 1).Init(), (std::vector<char>{0, 0, 0}));
+  EXPECT_EQ(AfterAChangeOfTask(false, 1).EpisodeStarts(), (std::vector<char>{0, 0, 0}));
   // Worker 0's episode has just ended after two steps.
-  EXPECT_EQ(AfterAChangeOfTask(false, 2).Init(), (std::vector<char>{1, 0, 0}));
+  EXPECT_EQ(AfterAChangeOfTask(false, 2).EpisodeStarts(), (std::vector<char>{1, 0, 0}));
 }
 
 TEST(VecEnv, RefusesATaskOfOtherSizes) {
@@ -268,7 +268,7 @@ TEST(VecEnv, RefusesATaskOfOtherSizes) {
     const EnvSpec& Spec() const override { return spec; }
     void Reset(Rng&, std::span<double>) override {}
     StepResult Step(std::span<const double>, std::span<double>) override { return {}; }
-    void Visit(StateVisitor&, const std::string&) override {}
+    void Serialize(StateVisitor&, const std::string&) override {}
     EnvSpec spec{"Wider-v0", 3, 2, 9, {-1, -1}, {1, 1}};
   };
   VecEnv env = ThreeWorkers();
