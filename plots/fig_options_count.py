@@ -30,10 +30,12 @@ def draw(inputs: Inputs) -> list[Drawing]:
                 continue
             line, marker, shift = FIDELITY_LOOKS[fidelity]
             means = [s.moments.mean for s in samples.values()]
-            panel.plot([K * shift for K in samples], means, color=color, linestyle=line, marker=marker)
+            panel.plot([K * shift for K in samples], means, color=color, linestyle=line,
+                       marker=marker)
             for K, sample in samples.items():
                 if sample.moments.n > 1:
-                    panel.vlines(K * shift, *one_sample(sample.moments).interval, color=color, linewidth=1)
+                    low, high = one_sample(sample.moments).interval
+                    panel.vlines(K * shift, low, high, color=color, linewidth=1)
             ppo = inputs.sources[fidelity].get((task, "ppo"))
             if ppo is not None:
                 panel.axhline(ppo.moments.mean, color=INK, linewidth=0.8, linestyle=line)
