@@ -86,7 +86,7 @@ def draw(name: str, task: str, steps: dict[str, np.ndarray]) -> Drawing:
     time, o = steps["step"][first], steps["o"][first].astype(int)
     K = sum(column.startswith("P") for column in steps)
     quantities = QUANTITIES.get(task, {})
-    figure, axes = new_figure(7, 1.2 * len(quantities) + 1.1, len(quantities) + 1, 1, sharex=True)
+    figure, axes = new_figure(7, 0.9, len(quantities) + 1, 1, sharex=True)
     for (panel,), (what, entry) in zip(axes, quantities.items()):
         panel.plot(time, steps[f"obs{entry}"][first], color="#1a1a1a", linewidth=0.8)
         panel.set_ylabel(what)

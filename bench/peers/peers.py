@@ -24,7 +24,7 @@ OURS = ("HalfCheetah-v2", "Ant-v2")
 
 @dataclass
 class Program:
-    """A program whose command ends in a number of steps; `scale` lengthens the runs of fast ones."""
+    """A command before a number of steps, and what is after it; `scale` lengthens fast ones."""
 
     work: str
     name: str
@@ -89,7 +89,8 @@ def table(all_programs: list[Program], costs: list[list[float]]) -> str:
     """Markdown: medians, least ones, and ratios to our median of the same work."""
     own = {program.work: statistics.median(cost)
            for program, cost in zip(all_programs, costs) if program.name == "option2vec"}
-    lines = ["| work | program | CPU [µs a step], median | least | over ours |", "|---|---|---|---|---|"]
+    lines = ["| work | program | CPU [µs a step], median | least | over ours |",
+             "|---|---|---|---|---|"]
     for program, cost in zip(all_programs, costs):
         median = statistics.median(cost)
         lines.append(f"| {program.work} | {program.name} | {median:.1f} | {min(cost):.1f} | "
@@ -110,7 +111,8 @@ def main() -> None:
     model = next((line.split(": ")[1] for line in open("/proc/cpuinfo", encoding="utf-8")
                   if line.startswith("model name")), "unknown").strip()
     packages = ", ".join((PEERS / "requirements.txt").read_text(encoding="utf-8").split())
-    text = f"Processor: {model}. Turns: {turns}. Packages: {packages}.\n\n{table(all_programs, costs)}"
+    text = (f"Processor: {model}. Turns: {turns}. Packages: {packages}.\n\n"
+            f"{table(all_programs, costs)}")
     page.write_text(f"{before}{BEGIN}\n{text}\n{END}{after}", encoding="utf-8")
 
 
