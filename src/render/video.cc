@@ -20,6 +20,8 @@ extern char** environ;
 namespace o2v {
 namespace {
 
+constexpr int kFilm = 3;  // descriptor of the film in the child
+
 /// What ffmpeg is told of the output.
 std::vector<std::string> Coding(const std::filesystem::path& path) {
   const std::string ending = path.extension().string();
@@ -41,7 +43,7 @@ void RequireVideoName(const std::filesystem::path& path) { Coding(path); }
 
 Video::Video(const std::filesystem::path& path, int width, int height, double fps,
              const std::string& program)
-    : path_(path), unfinished_(path.string() + ".tmp"), width_(width), height_(height) {
+    : path_(path), width_(width), height_(height) {
   std::vector<std::string> words = {program,    "-v",
                                     "error",    "-y",
                                     "-f",       "rawvideo",
@@ -50,14 +52,15 @@ Video::Video(const std::filesystem::path& path, int width, int height, double fp
                                     "-r",       std::to_string(fps),
                                     "-i",       "pipe:0"};
   for (const std::string& word : Coding(path)) words.push_back(word);
-  words.push_back("file:" + unfinished_.string());
+  words.push_back(Concat("file:/proc/self/fd/", kFilm));
   RequireWritable(path);
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
 
-  log_ = ::memfd_create("option2vec film", MFD_CLOEXEC);
-  Check(log_ >= 0, "film: no memory: ", std::strerror(errno));
+  log_ = ::memfd_create("log of ffmpeg", MFD_CLOEXEC);
+  film_ = ::memfd_create("film", MFD_CLOEXEC);
+  Check(log_ >= 0 && film_ >= 0, "film: no memory: ", std::strerror(errno));
   // A socket, not a pipe: writing to a program that has ended is an error there, no signal.
   int ends[2];
   Check(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) == 0,
@@ -68,6 +71,7 @@ Video::Video(const std::filesystem::path& path, int width, int height, double fp
   ::posix_spawn_file_actions_adddup2(&files, ends[1], STDIN_FILENO);
   ::posix_spawn_file_actions_adddup2(&files, log_, STDOUT_FILENO);
   ::posix_spawn_file_actions_adddup2(&files, log_, STDERR_FILENO);
+  ::posix_spawn_file_actions_adddup2(&files, film_, kFilm);
   const int error =
       ::posix_spawnp(&child_, program.c_str(), &files, nullptr, arguments.data(), environ);
   ::posix_spawn_file_actions_destroy(&files);
@@ -75,7 +79,8 @@ Video::Video(const std::filesystem::path& path, int width, int height, double fp
   if (error != 0) {
     child_ = -1;
     ::close(std::exchange(pipe_, -1));
-    ::close(std::exchange(log_, -1));
+    ::close(log_);
+    ::close(film_);
     throw ConfigError(Concat(program, ": cannot be run, which writes films: ", std::strerror(error),
                              "; `make deps FILM=1` installs it"));
   }
@@ -87,9 +92,8 @@ Video::~Video() {
     ::kill(child_, SIGKILL);
     Wait();
   }
-  if (log_ >= 0) ::close(log_);
-  std::error_code ignored;
-  std::filesystem::remove(unfinished_, ignored);
+  ::close(log_);
+  ::close(film_);
 }
 
 void Video::Write(const Image& frame) {
@@ -109,8 +113,9 @@ void Video::Finish() {
   ::close(std::exchange(pipe_, -1));
   Wait();
   if (!WIFEXITED(status_) || WEXITSTATUS(status_) != 0) Fail();
-  SyncFile(unfinished_);
-  std::filesystem::rename(unfinished_, path_);
+  const std::string film = ReadFile(Concat("/proc/self/fd/", film_));
+  if (film.empty()) Fail();
+  WriteFileAtomically(path_, film);
 }
 
 void Video::Wait() {

@@ -13,7 +13,8 @@ namespace o2v {
 /// Throws ConfigError, which says what there is, unless a path ends in .mp4, .gif or .png.
 void RequireVideoName(const std::filesystem::path& path);
 
-/// One file. It is there, and whole, after Finish; without it nothing is left behind.
+/// One file. It is there, and whole, after Finish; without it nothing is left behind. Until then
+/// the film is in memory: ffmpeg does not report every disk that is full.
 class Video {
  public:
   /// A film of frames of this size; the first one alone for .png. `program` is found as a shell
@@ -33,9 +34,10 @@ class Video {
   [[noreturn]] void Fail();       // with its last words
   std::string LastWords() const;  // of its standard error
 
-  std::filesystem::path path_, unfinished_;
+  std::filesystem::path path_;
   int width_, height_;
-  int log_ = -1, pipe_ = -1;
+  int log_ = -1, film_ = -1;  // memory: what ffmpeg says, what it makes
+  int pipe_ = -1;
   pid_t child_ = -1;
   int status_ = 0;
 };
