@@ -115,7 +115,13 @@ void Video::Finish() {
   if (!WIFEXITED(status_) || WEXITSTATUS(status_) != 0) Fail();
   const std::string film = ReadFile(Concat("/proc/self/fd/", film_));
   if (film.empty()) Fail();
-  WriteFileAtomically(path_, film);
+  try {
+    WriteFileAtomically(path_, film);
+  } catch (const Error&) {  // as on a full disk
+    std::error_code ignored;
+    std::filesystem::remove(path_.string() + ".tmp", ignored);
+    throw;
+  }
 }
 
 void Video::Wait() {

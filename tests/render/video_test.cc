@@ -66,6 +66,12 @@ TEST_F(Videos, ThatFailLeaveNothingAndSayWhy) {
   EXPECT_EQ(Files(), std::vector<std::string>{});
 }
 
+TEST_F(Videos, ThatDoNotFitTheDiskSaySo) {
+  fs::create_symlink("/dev/full", dir_ / "x.mp4");
+  EXPECT_EQ(Refused("cat > \"$file\"\n", 3), ": cannot write: No space left on device");
+  EXPECT_EQ(Files(), std::vector{"x.mp4"s});
+}
+
 TEST_F(Videos, ThatAreGivenUpLeaveNothing) {
   { Video(dir_ / "x.gif", 2, 1, 20, Fake("cat > \"$file\"\n")).Write(Frame(1)); }
   EXPECT_EQ(Files(), std::vector<std::string>{});
