@@ -8,9 +8,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "python"))  # of the checkout
 
 from option2vec_results import records  # noqa: E402
 from option2vec_results.records import (  # noqa: E402,F401
-    FIDELITIES, FINITE, FORMAT, INFINITE, INTERPRETATIONS, LEFT_OUT, METHODS, MILLION, PAIRS, SEEDS,
-    TASKS, Cell, Columns, DamagedFile, Key, Rows, Run, finite, number_or_nan, read_numbers, read_run,
-    read_table)
+    FIDELITIES, FINITE, FORMAT, INFINITE, INTERPRETATIONS, LEFT_OUT, METHODS, MILLION, PAIRS,
+    SEEDS, TASKS, Cell, Columns, DamagedFile, Key, Rows, Run, finite, number_or_nan,
+    read_numbers, read_run, read_table)
 from option2vec_results.run import load_run  # noqa: E402,F401
 
 GRID_METHODS = tuple(METHODS)  # METHODS has the joined ones, too

@@ -1,4 +1,4 @@
-"""Which option is active when: of `option2vec eval --trajectory`, and what it tells of the movement.
+"""Which option is active when, of `option2vec eval --trajectory`, and what it tells of the motion.
 
 The paper says that options coincide with phases of the movement ("runs forward", "recovers"). Here
 that is a number: the mutual information between the option and the option before, and between the

@@ -1,6 +1,6 @@
 """A policy from a file in the safetensors layout, and Option2Vec's networks at a state.
 
-Names and shapes of the tensors are those of docs/formats.md, the networks those of spec 2.6 and 2.7.
+Names and shapes of tensors are those of docs/formats.md, networks those of spec 2.6 and 2.7.
 """
 
 import json
