@@ -6,7 +6,7 @@
 set -eu
 cd "$(dirname "$0")/.."
 
-find README.md docs src tests bench paper_configs plots -type f ! -path 'tests/data/*' \
+find README.md docs src tests bench paper_configs plots python -type f ! -path 'tests/data/*' \
     ! -path docs/algorithms.md ! -path docs/environments.md \
     \( -name '*.cc' -o -name '*.h' -o -name '*.inc' -o -name '*.toml' -o -name '*.py' \
        -o -name '*.txt' -o -name '*.md' \) |
