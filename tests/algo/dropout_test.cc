@@ -99,7 +99,7 @@ TEST(Option2Vec, RedrawsOptionsThroughTheMasksOfTheUpdate) {
       DrawDropoutMask(0.2, dropout, *mask);
       fixed.dropout.emplace_back((mask->array() > 0).cast<Real>());
     }
-    on.net.Forward(batch.s, batch.o_prev, batch.init, &masks, on.c);
+    on.net.Forward(batch.s, batch.o_prev, batch.init, on.tables, &masks, on.c);
     fixed.o.resize(std::size_t(B));
     SampleCategorical(on.c.P, redraw, fixed.o);
     const LossTerms drawn = on.algorithm->Loss(stage, batch, nullptr);

@@ -17,7 +17,7 @@ volatile Real smallest = std::numeric_limits<Real>::min();  // not a constant to
 class Subnormal final : public Method {
  public:
   explicit Subnormal(const AlgorithmInput& in) : Method(in, /*K=*/0) {
-    Assemble(in, {&weight_}, {[](const std::string&) { return true; }}, nullptr, nullptr);
+    RegisterNetworks(in, {&weight_}, {{&weight_}}, nullptr, nullptr);
   }
   void Collect(VecEnv&, std::vector<Episode>&) override { acted = Half(); }
   const std::vector<SumAndCount>& Update() override {
