@@ -49,18 +49,18 @@ BENCHMARK(BM_Product)
 
 void BM_BodyForward(benchmark::State& state) {
   Rng rng(1, "bench");
-  const Body body("body", S, h, state.range(0) ? Activation::kRelu : Activation::kTanh, rng);
+  const MlpTrunk body("body", S, h, state.range(0) ? Activation::kRelu : Activation::kTanh, rng);
   const Mat x = Mat::Random(S, state.range(1));
-  Body::Cache cache;
+  MlpTrunk::Cache cache;
   for (auto _ : state) body.Forward(x, cache);
 }
 BENCHMARK(BM_BodyForward)->ArgNames({"relu", "B"})->ArgsProduct({{0, 1}, {1, 4, 64}});
 
 void BM_BodyBackward(benchmark::State& state) {
   Rng rng(1, "bench");
-  Body body("body", S, h, state.range(0) ? Activation::kRelu : Activation::kTanh, rng);
+  MlpTrunk body("body", S, h, state.range(0) ? Activation::kRelu : Activation::kTanh, rng);
   const Mat x = Mat::Random(S, B), dy = Mat::Random(h, B);
-  Body::Cache cache;
+  MlpTrunk::Cache cache;
   body.Forward(x, cache);
   Mat dh1;
   for (auto _ : state) {

@@ -105,7 +105,7 @@ int Draw(const MatD& table, int row, Rng& rng);
 /// Draws one way from x on until gamma^n < 1e-6, where what is left out is less than 1/100 of a
 /// standard error of 200000 returns; calls visit(gamma^n, x_n, o_n, a_n).
 template <typename Visit>
-void Rollout(const Process& process, int x, Rng& rng, Serialize visit) {
+void Rollout(const Process& process, int x, Rng& rng, Visit visit) {
   for (double discount = 1; discount >= 1e-6; discount *= kGamma) {
     const int s = StateOf(x);
     const int o = Draw(process.P, x, rng);

@@ -87,8 +87,8 @@ Comparison CheckElementwise(void (*f)(MatRef), void (*backward)(const ConstMatRe
 
 Comparison CheckBody(Activation g) {
   Rng rng(4, "gradcheck.body");
-  Body body("body", 4, 6, g, rng);
-  Body::Cache cache;
+  MlpTrunk body("body", 4, 6, g, rng);
+  MlpTrunk::Cache cache;
   Mat x, z0, z1;
   do {
     Randomize(body.Params(), rng);
