@@ -154,7 +154,8 @@ TEST_F(Program, APolicyIsWhatItsFileSays) {
     for (const std::string other : {" --fidelity released", " --algo oc"}) {
       const Outcome outcome = Run(command + other);
       EXPECT_EQ(outcome.code, 2) << command << other;
-      EXPECT_NE(outcome.err.find("run/last.ckpt: made with '"), std::string::npos) << outcome.err;
+      EXPECT_NE(outcome.err.find("run/last.ckpt: trained with '"), std::string::npos)
+          << outcome.err;
     }
   }
 }
@@ -322,7 +323,7 @@ TEST_F(Program, JobsAndProgressGoByTheRecords) {
                       "fidelities = ['paper']\nseeds = [0, 1, 2, 3]\n"
                       "[run]\nsteps = 64\n[algo.ppo]\nrollout = 64\n");
   EXPECT_EQ(Run("progress tiny.toml --at-once 2").out,
-            "4 runs: 0 done, 4 left, time left known after the first\n");
+            "4 runs: 0 done, 4 left, the time left is known after the first run\n");
   const std::string folder = "results/tiny/paper/InvertedPendulum-v2/ppo/";
   ASSERT_EQ(Run("train --config tiny.toml --task InvertedPendulum-v2 --algo ppo --seed 0 --out " +
                 folder + "seed-000")
@@ -346,7 +347,7 @@ TEST_F(Program, JobsAndProgressGoByTheRecords) {
   const Outcome jobs = Run("jobs tiny.toml");
   EXPECT_EQ(std::count(jobs.out.begin(), jobs.out.end(), '\n'), 3) << jobs.out;
   EXPECT_EQ(jobs.out.find("--seed 0 "), std::string::npos) << "not made again by itself";
-  EXPECT_EQ(jobs.err, folder + "seed-000: by an older revision of the method\n");
+  EXPECT_EQ(jobs.err, folder + "seed-000: made by an older revision of the method\n");
   EXPECT_TRUE(
       Run("progress tiny.toml")
           .out.starts_with("4 runs: 1 done (1 by older revisions of their methods), 3 left"));
