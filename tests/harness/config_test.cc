@@ -467,8 +467,10 @@ TEST(ReadExperiment, RefusesBadLists) {
   EXPECT_CONTAINS(message("tasks = ['Ant-v1']\n" + rest), "'Ant-v2'");
   EXPECT_CONTAINS(message("tasks = ['Ant-v2']\nseed = [1]\n" + rest), "'seeds'");
   // A flag such as contact_forces is the same in both fidelities: nothing to turn.
-  EXPECT_CONTAINS(message("tasks = ['Ant-v2']\nablations = ['contact_forces']\n" + rest), "x.toml:3");
-  EXPECT_CONTAINS(message("tasks = ['Ant-v2']\nablations = ['time_limit']\n" + rest), "'timelimit'");
+  EXPECT_CONTAINS(message("tasks = ['Ant-v2']\nablations = ['contact_forces']\n" + rest),
+                  "x.toml:3");
+  EXPECT_CONTAINS(message("tasks = ['Ant-v2']\nablations = ['time_limit']\n" + rest),
+                  "'timelimit'");
   EXPECT_CONTAINS(Message([] { ReadExperiment({"x.toml", "[run]\n"}); }), "[experiment]");
 }
 
