@@ -81,8 +81,13 @@ class Iopg final : public Method {
   /// Loss and gradients of `nets` on an episode of n steps.
   LossTerms EpisodeLoss(OptionNets& nets, const ConstMatRef& s, const ConstMatRef& a,
                         std::span<const double> r, std::span<const int> init);
-  void ForwardHistory(std::span<const int> init, Index n);
-  void BackwardHistory(std::span<const int> init, Index n);
+  void Forward(std::span<const int> init, Index n);
+  void Backward(std::span<const int> init, Index n);
+  void ForwardReleased(std::span<const int> init, Index n);
+  void BackwardReleased(std::span<const int> init, Index n);
+  void Pass(const Eigen::Ref<const VecD>& weights, bool init, Index t);
+  void PassBackward(const Eigen::Ref<const VecD>& weights, bool init, Index t);
+  double Kappa(Index n, Index t) const;
 
   const double gamma_;
   OptionNets nets_;  // the master copy
@@ -227,95 +232,107 @@ void Iopg::History::Resize(Index K, Index n) {
   for (VecD* x : {&v, &R, &log_c, &dv}) x->resize(n);
 }
 
-/// m, w, ln c from ln p, pi and beta. In log space: w_t is a softmax of ln m_t + ln p_t.
-void Iopg::ForwardHistory(std::span<const int> init, Index n) {
+/// m_t, from the weights of the options before that pass through P_t, and ln c_t.
+void Iopg::Pass(const Eigen::Ref<const VecD>& weights, bool init, Index t) {
   History& h = history_;
-  const bool paper = switches_.iopg_posterior == Fidelity::kPaper;
-  const double K = double(K_);
-  for (Index t = 0; t < n; ++t) {
-    const auto pi = h.pi.col(t).array(), beta = h.beta.col(t).array(),
-               log_p = h.log_p.col(t).array();
-    auto m = h.m.col(t).array();
-    auto w = h.w.col(t).array();
-    // The weights that pass through P_t: w_{t-1}, or by the switch m_{t-1} p_t / sum, m_0 = 1/K.
-    if (!paper) {
-      if (t > 0) {
-        w = h.m.col(t - 1).array().log() + log_p;
-      } else {
-        w = log_p - std::log(K);
-      }
-      w = (w - w.maxCoeff()).exp();
-      w /= w.sum();
-    }
-    if (init[std::size_t(t)]) {
-      m = pi;
-    } else {
-      const auto before = paper ? h.w.col(t - 1).array() : h.w.col(t).array();
-      if (switches_.beta_index == Fidelity::kPaper) {
-        m = (1 - beta) * before + (beta * before).sum() * pi;
-      } else {
-        m = (1 - beta) * before + beta * pi;
-      }
-    }
-    const double top = (m.log() + log_p).maxCoeff();
-    h.log_c(t) = top + std::log((m.log() + log_p - top).exp().sum());
-    if (paper) w = (m.log() + log_p - h.log_c(t)).exp();
+  const auto pi = h.pi.col(t).array(), beta = h.beta.col(t).array(), log_p = h.log_p.col(t).array();
+  auto m = h.m.col(t).array();
+  if (init) {
+    m = pi;
+  } else if (switches_.beta_index == Fidelity::kPaper) {
+    m = (1 - beta) * weights.array() + (beta * weights.array()).sum() * pi;
+  } else {
+    m = (1 - beta) * weights.array() + beta * pi;
+  }
+  const double top = (m.log() + log_p).maxCoeff();
+  h.log_c(t) = top + std::log((m.log() + log_p - top).exp().sum());
+}
+
+/// The adjoints of the logits of pi and beta, and dweights, from dm; the backward of Pass.
+void Iopg::PassBackward(const Eigen::Ref<const VecD>& weights, bool init, Index t) {
+  History& h = history_;
+  const auto pi = h.pi.col(t).array(), beta = h.beta.col(t).array();
+  const auto dm = h.dm.array();
+  h.db.col(t).setZero();
+  h.dweights.setZero();
+  const double along = (pi * dm).sum();
+  if (init) {
+    h.dz.col(t) = pi * (dm - along);
+  } else if (switches_.beta_index == Fidelity::kPaper) {
+    h.db.col(t) = weights.array() * (along - dm) * beta * (1 - beta);
+    h.dz.col(t) = (beta * weights.array()).sum() * pi * (dm - along);
+    h.dweights = (1 - beta) * dm + beta * along;
+  } else {
+    h.db.col(t) = dm * (pi - weights.array()) * beta * (1 - beta);
+    h.dz.col(t) = pi * (beta * dm - (beta * pi * dm).sum());
+    h.dweights = (1 - beta) * dm + (beta * pi * dm).sum();
   }
 }
 
-/// Adjoints of ln p, of the logits and of v, from the last step to the first; spec 4.5 (e).
-void Iopg::BackwardHistory(std::span<const int> init, Index n) {
-  History& h = history_;
-  const bool paper = switches_.iopg_posterior == Fidelity::kPaper;
+/// dL / d ln c_t.
+double Iopg::Kappa(Index n, Index t) const {
+  const History& h = history_;
   const bool eps = switches_.density_log_eps == Fidelity::kReleased;
-  VecD &dm = h.dm, &dweights = h.dweights, &dw = h.dw;
-  dw.setZero();
-  for (Index t = n - 1; t >= 0; --t) {
-    const auto pi = h.pi.col(t).array(), beta = h.beta.col(t).array(), m = h.m.col(t).array();
-    const auto ratio = (h.log_p.col(t).array() - h.log_c(t)).exp();  // p_t / c_t
-    const double c = std::exp(std::min(h.log_c(t), kLargeLog));
-    const double kappa =
-        -(h.R(t) - h.v(t)) / double(n) * (eps ? c / (c + kLogEps) : 1);  // of ln c_t
-    if (paper) {
-      const double mean = dw.dot(h.w.col(t));
-      dm = (kappa + dw.array() - mean) * ratio;
-    } else {
-      dm = kappa * ratio + dw.array();
-    }
-    if (paper) {
-      h.dlog_p.col(t) = m * dm.array();
-    } else {
-      h.dlog_p.col(t) = kappa * m * ratio;
-    }
+  const double c = std::exp(std::min(h.log_c(t), kLargeLog));
+  return -(h.R(t) - h.v(t)) / double(n) * (eps ? c / (c + kLogEps) : 1);
+}
 
-    // Through P_t: m = (1 - beta) w + (...) pi.
-    h.db.col(t).setZero();
-    dweights.setZero();
-    const double along = (pi * dm.array()).sum();
-    if (init[std::size_t(t)]) {
-      h.dz.col(t) = pi * (dm.array() - along);
+/// m, ln c and w from ln p, pi and beta: w_{t-1} passes through P_t. In log space: w_t is a softmax
+/// of ln m_t + ln p_t.
+void Iopg::Forward(std::span<const int> init, Index n) {
+  History& h = history_;
+  for (Index t = 0; t < n; ++t) {
+    Pass(h.w.col(std::max<Index>(t - 1, 0)), init[std::size_t(t)], t);  // none before a first step
+    h.w.col(t) = (h.m.col(t).array().log() + h.log_p.col(t).array() - h.log_c(t)).exp();
+  }
+}
+
+/// Adjoints of ln p and of the logits, from the last step to the first; spec 4.5 (e). dw: of w_t.
+void Iopg::Backward(std::span<const int> init, Index n) {
+  History& h = history_;
+  h.dw.setZero();
+  for (Index t = n - 1; t >= 0; --t) {
+    const auto p_over_c = (h.log_p.col(t).array() - h.log_c(t)).exp();
+    const double mean = h.dw.dot(h.w.col(t));
+    h.dm = (Kappa(n, t) + h.dw.array() - mean) * p_over_c;
+    h.dlog_p.col(t) = h.m.col(t).array() * h.dm.array();
+    PassBackward(h.w.col(std::max<Index>(t - 1, 0)), init[std::size_t(t)], t);
+    h.dw = h.dweights;
+  }
+}
+
+/// Forward with `iopg_posterior` = released: what passes through P_t is w_t = m_{t-1} p_t over its
+/// sum, m_{-1} = 1/K.
+void Iopg::ForwardReleased(std::span<const int> init, Index n) {
+  History& h = history_;
+  for (Index t = 0; t < n; ++t) {
+    auto w = h.w.col(t).array();
+    if (t > 0) {
+      w = h.m.col(t - 1).array().log() + h.log_p.col(t).array();
     } else {
-      const auto before = paper ? h.w.col(t - 1).array() : h.w.col(t).array();
-      if (switches_.beta_index == Fidelity::kPaper) {
-        h.db.col(t) = before * (along - dm.array()) * beta * (1 - beta);
-        h.dz.col(t) = (beta * before).sum() * pi * (dm.array() - along);
-        dweights = (1 - beta) * dm.array() + beta * along;
-      } else {
-        h.db.col(t) = dm.array() * (pi - before) * beta * (1 - beta);
-        h.dz.col(t) = pi * (beta * dm.array() - (beta * pi * dm.array()).sum());
-        dweights = (1 - beta) * dm.array() + (beta * pi * dm.array()).sum();
-      }
+      w = h.log_p.col(t).array() - std::log(double(K_));
     }
-    if (paper) {
-      dw = dweights;
-    } else {  // weights = softmax(ln m_{t-1} + ln p_t)
-      const auto weights = h.w.col(t).array();
-      const double mean = (weights * dweights.array()).sum();
-      h.dlog_p.col(t).array() += weights * (dweights.array() - mean);
-      if (t > 0) {
-        dw = weights * (dweights.array() - mean) / h.m.col(t - 1).array();
-      }
-    }
+    w = (w - w.maxCoeff()).exp();
+    w /= w.sum();
+    Pass(h.w.col(t), init[std::size_t(t)], t);
+  }
+}
+
+/// Its backward. dw: of m_t.
+void Iopg::BackwardReleased(std::span<const int> init, Index n) {
+  History& h = history_;
+  h.dw.setZero();
+  for (Index t = n - 1; t >= 0; --t) {
+    const auto p_over_c = (h.log_p.col(t).array() - h.log_c(t)).exp();
+    const double kappa = Kappa(n, t);
+    h.dm = kappa * p_over_c + h.dw.array();
+    h.dlog_p.col(t) = kappa * h.m.col(t).array() * p_over_c;
+    PassBackward(h.w.col(t), init[std::size_t(t)], t);
+    // w_t = softmax(ln m_{t-1} + ln p_t).
+    const auto w = h.w.col(t).array();
+    const double mean = (w * h.dweights.array()).sum();
+    h.dlog_p.col(t).array() += w * (h.dweights.array() - mean);
+    if (t > 0) h.dw = w * (h.dweights.array() - mean) / h.m.col(t - 1).array();
   }
 }
 
@@ -357,7 +374,8 @@ LossTerms Iopg::EpisodeLoss(OptionNets& nets, const ConstMatRef& s, const ConstM
     h.v.segment(start, m) = block.critic.out.row(0).head(m).transpose().cast<double>();
   }
 
-  ForwardHistory(init_given_, n);
+  const bool paper = switches_.iopg_posterior == Fidelity::kPaper;
+  paper ? Forward(init_given_, n) : ForwardReleased(init_given_, n);
   double R = 0;
   for (Index t = n - 1; t >= 0; --t) {
     R = r[std::size_t(t)] + gamma_ * R;
@@ -370,7 +388,7 @@ LossTerms Iopg::EpisodeLoss(OptionNets& nets, const ConstMatRef& s, const ConstM
     terms.value += 0.5 * A_t * A_t / double(n);
     h.dv(t) = -A_t / double(n);
   }
-  BackwardHistory(init_given_, n);
+  paper ? Backward(init_given_, n) : BackwardReleased(init_given_, n);
   terms.entropy = GaussianMeanEntropy(blocks_[0]->policy.sigma_of);
   terms.total = terms.surrogate + terms.value;
 
