@@ -1,34 +1,10 @@
 #include "algo/method.h"
 
 #include <algorithm>
-#include <numeric>
 
 namespace o2v {
 
 // ---- Statistics ---------------------------------------------------------------------------------
-
-void OptionUsage::Clear() {
-  std::fill(executed_.begin(), executed_.end(), 0);
-  std::fill(begun_.begin(), begun_.end(), 0);
-}
-
-void OptionUsage::Count(int o, int o_prev, bool init) {
-  executed_[std::size_t(o)] += 1;
-  begun_[std::size_t(o)] += init || o != o_prev;
-}
-
-void OptionUsage::Report(std::vector<SumAndCount>& ratios) const {
-  const double steps = std::accumulate(executed_.begin(), executed_.end(), 0.0);
-  for (const double n : executed_) ratios.push_back({n, steps});
-  for (std::size_t k = 0; k < executed_.size(); ++k) ratios.push_back({executed_[k], begun_[k]});
-}
-
-void OptionUsage::Names(std::vector<std::string>& names) const {
-  for (std::size_t k = 0; k < executed_.size(); ++k) names.push_back("usage_" + std::to_string(k));
-  for (std::size_t k = 0; k < executed_.size(); ++k) {
-    names.push_back("duration_" + std::to_string(k) + "_steps");
-  }
-}
 
 void Method::RecordOptions(Index column, std::span<const int> o, std::span<const char> init,
                            Batch& rollout) {

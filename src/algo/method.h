@@ -11,7 +11,8 @@
 
 #include "algo/algorithm.h"
 #include "algo/option_nets.h"
-#include "algo/surrogate.h"
+#include "algo/statistics.h"
+#include "algo/losses.h"
 #include "base/flush_subnormals.h"
 #include "nn/activation.h"
 #include "nn/adam.h"
@@ -31,25 +32,6 @@ class CacheByWidth {
 
  private:
   std::map<Index, std::unique_ptr<Cache>> caches_;
-};
-
-/// How often and how long the options were executed since Clear.
-class OptionUsage {
- public:
-  explicit OptionUsage(Index K) : executed_(std::size_t(K), 0), begun_(executed_) {}
-
-  void Clear();
-  /// A step with option o, after o_prev or at an episode's start.
-  void Count(int o, int o_prev, bool init);
-  /// Appends each option's share of the steps, then the mean length [steps] of its executions: its
-  /// steps by the executions that began. Cut anywhere and added up again they are the same: an
-  /// execution counts once, where it began, and its steps where they are.
-  void Report(std::vector<SumAndCount>& ratios) const;
-  /// The columns of Report.
-  void Names(std::vector<std::string>& names) const;
-
- private:
-  std::vector<double> executed_, begun_;  // (K) steps of each option; its executions
 };
 
 /// The thin base of the methods: optimiser, random streams, statistics, saved state, and what most

@@ -15,13 +15,12 @@
 #include <string>
 #include <vector>
 
-#include "base/align.h"
 #include "base/decimal.h"
 #include "base/files.h"
 #include "base/printable.h"
-#include "base/stats.h"
 #include "env/pairs.h"
 #include "env/replay.h"
+#include "harness/align.h"
 #include "harness/checkpoint.h"
 #include "harness/config.h"
 #include "harness/evaluate.h"
@@ -30,6 +29,7 @@
 #include "harness/manifest.h"
 #include "harness/param_table.h"
 #include "harness/record.h"
+#include "harness/stats.h"
 #include "harness/summary.h"
 #include "harness/tensorboard.h"
 #include "harness/trainer.h"

@@ -6,8 +6,8 @@
 #include <sstream>
 #include <tuple>
 
-#include "base/align.h"
 #include "base/check.h"
+#include "harness/align.h"
 
 namespace o2v {
 namespace {

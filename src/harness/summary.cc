@@ -9,11 +9,11 @@
 #include <tuple>
 
 #include "algo/algorithm.h"
-#include "base/align.h"
 #include "base/check.h"
 #include "base/files.h"
 #include "embedded/reference.h"
 #include "env/pairs.h"
+#include "harness/align.h"
 #include "harness/record.h"
 
 namespace o2v {

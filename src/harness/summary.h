@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "base/stats.h"
+#include "harness/stats.h"
 
 namespace o2v {
 

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "algo/method.h"
 #include "algo/setup.h"
+#include "algo/statistics.h"
 
 namespace o2v {
 namespace {
@@ -111,6 +111,48 @@ TEST(Statistics, AreAsManyAsTheirNames) {
       EXPECT_EQ(Iterate(*algorithm, env).size(), algorithm->StatNames().size()) << method.id;
     }
   }
+}
+
+TEST(LossMeans, AverageTheMinibatches) {
+  LossMeans means;
+  LossTerms terms;
+  terms.total = 1;
+  means.Add(terms, 2);
+  terms.total = 5;
+  means.Add(terms, 4);
+  std::vector<SumAndCount> ratios;
+  std::vector<std::string> names;
+  means.Report(ratios);
+  LossMeans::Names("low", names);
+  ASSERT_EQ(ratios.size(), names.size());
+  EXPECT_EQ(names.front(), "loss_low");
+  EXPECT_EQ(ratios.front().n, 2);
+  EXPECT_EQ(ratios.front().Value(), 3);
+  EXPECT_EQ(names.back(), "grad_norm_low");
+  EXPECT_EQ(ratios.back().Value(), 3);
+}
+
+TEST(LossMeans, HaveTheColumnsOfAMethodBesideTheirOwn) {
+  const LossColumns more = {{"master", &LossTerms::master},
+                            {"termination", &LossTerms::termination}};
+  LossMeans means(more);
+  LossTerms terms;
+  terms.master = 2;
+  terms.termination = 7;
+  means.Add(terms, 1);
+  means.Clear();
+  terms.termination = 8;
+  means.Add(terms, 1);
+  std::vector<SumAndCount> ratios;
+  std::vector<std::string> names;
+  means.Report(ratios);
+  LossMeans::Names("all", names, more);
+  EXPECT_EQ(names, (std::vector<std::string>{"loss_all", "surrogate_all", "value_loss_all",
+                                             "entropy_all", "kl_all", "clip_fraction_all",
+                                             "master_all", "termination_all", "grad_norm_all"}));
+  std::vector<double> values;
+  for (const SumAndCount& ratio : ratios) values.push_back(ratio.Value());
+  EXPECT_EQ(values, (std::vector<double>{0, 0, 0, 0, 0, 0, 2, 8, 1}));
 }
 
 }  // namespace

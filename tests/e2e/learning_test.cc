@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "algo/setup.h"
-#include "base/stats.h"
+#include "harness/stats.h"
 
 namespace o2v {
 namespace {

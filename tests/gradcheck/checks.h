@@ -16,7 +16,7 @@ struct NamedCheck {
 
 /// Layers (src/nn).
 std::vector<NamedCheck> NnChecks();
-/// Distributions and the losses on their outputs (src/dist, algo/surrogate.h).
+/// Distributions and the losses on their outputs (src/dist, algo/losses.h).
 std::vector<NamedCheck> DistChecks();
 /// Whole networks and their outputs, every stage, fidelity and switch (src/algo).
 std::vector<NamedCheck> AlgoChecks();

@@ -1,4 +1,4 @@
-#include "algo/surrogate.h"
+#include "algo/losses.h"
 #include "dist/categorical.h"
 #include "dist/diag_gaussian.h"
 #include "gradcheck/checks.h"

@@ -1,6 +1,6 @@
 #include <memory>
 
-#include "algo/surrogate.h"
+#include "algo/losses.h"
 #include "base/check.h"
 #include "dist/categorical.h"
 #include "dist/diag_gaussian.h"

@@ -1,4 +1,4 @@
-#include "algo/surrogate.h"
+#include "algo/losses.h"
 
 #include <algorithm>
 
@@ -80,49 +80,6 @@ void EntryValueLoss(Mlp& critic, const ConstMatRef& s, std::span<const int> k, c
   c.critic.dout.setZero(c.critic.out.rows(), B);
   for (Index b = 0; b < B; ++b) c.critic.dout(k[std::size_t(b)], b) = c.dv(b);
   critic.Backward(s, c.critic);
-}
-
-// ---- Statistics ---------------------------------------------------------------------------------
-
-namespace {
-
-LossColumns AllColumns(const LossColumns& more) {
-  LossColumns columns = {{"loss", &LossTerms::total},
-                         {"surrogate", &LossTerms::surrogate},
-                         {"value_loss", &LossTerms::value},
-                         {"entropy", &LossTerms::entropy},
-                         {"kl", &LossTerms::kl},
-                         {"clip_fraction", &LossTerms::clip_fraction}};
-  columns.insert(columns.end(), more.begin(), more.end());
-  return columns;
-}
-
-}  // namespace
-
-LossMeans::LossMeans(const LossColumns& more)
-    : columns_(AllColumns(more)), sums_(columns_.size(), 0) {}
-
-void LossMeans::Clear() {
-  std::fill(sums_.begin(), sums_.end(), 0);
-  grad_norm_ = 0;
-  n_ = 0;
-}
-
-void LossMeans::Add(const LossTerms& terms, double grad_norm) {
-  for (std::size_t i = 0; i < sums_.size(); ++i) sums_[i] += terms.*columns_[i].second;
-  grad_norm_ += grad_norm;
-  ++n_;
-}
-
-void LossMeans::Report(std::vector<SumAndCount>& ratios) const {
-  for (const double sum : sums_) ratios.push_back({sum, double(n_)});
-  ratios.push_back({grad_norm_, double(n_)});
-}
-
-void LossMeans::Names(const std::string& stage, std::vector<std::string>& names,
-                      const LossColumns& more) {
-  for (const auto& [name, term] : AllColumns(more)) names.push_back(name + "_" + stage);
-  names.push_back("grad_norm_" + stage);
 }
 
 }  // namespace o2v

@@ -1,4 +1,4 @@
-#include "base/align.h"
+#include "harness/align.h"
 
 #include <algorithm>
 

@@ -2,9 +2,6 @@
 // Losses that the methods share.
 
 #include <span>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "algo/algorithm.h"
 #include "algo/option_nets.h"
@@ -56,31 +53,5 @@ struct ValueCache {
 /// 1/2 mean (x_k - ret)^2 of the critic's outputs x at s (S, B), k (B). Adds to the gradients.
 void EntryValueLoss(Mlp& critic, const ConstMatRef& s, std::span<const int> k, const Vec& ret,
                     LossTerms& terms, ValueCache& c);
-
-// ---- Statistics ---------------------------------------------------------------------------------
-
-/// Columns of updates.csv: a name and the term that it shows.
-using LossColumns = std::vector<std::pair<std::string, double LossTerms::*>>;
-
-/// Mean of the terms of a stage's minibatches.
-class LossMeans {
- public:
-  /// more: columns beside those of all methods.
-  explicit LossMeans(const LossColumns& more = {});
-  void Clear();
-  void Add(const LossTerms& terms, double grad_norm);
-  /// Appends total, surrogate, value, entropy, kl, clip_fraction, the other columns and grad_norm,
-  /// in the order of Names.
-  void Report(std::vector<SumAndCount>& ratios) const;
-  /// The columns of `stage`.
-  static void Names(const std::string& stage, std::vector<std::string>& names,
-                    const LossColumns& more = {});
-
- private:
-  LossColumns columns_;
-  std::vector<double> sums_;
-  double grad_norm_ = 0;
-  int n_ = 0;
-};
 
 }  // namespace o2v
