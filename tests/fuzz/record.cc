@@ -8,8 +8,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace o2v;
   static MemoryFile file;
   Accepts([&] {
-    const Record record = ReadRecord(file.Holding(Bytes(data, size)));
-    ParseRunConfig(record.config, "record");
+    const RecordHead head = ReadRecordHead(file.Holding(Bytes(data, size)));
+    ParseRunConfig(head.config_text, "record");
   });
   return 0;
 }
