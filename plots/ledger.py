@@ -88,8 +88,9 @@ def sentence(judged: Sequence[Judged]) -> str:
         lost = [NAMES[s] for s in SOURCES if words[s] in ("fails", "false")]
         known = [w for w in words.values() if w != "-"]
         if lost:
-            everywhere = len(lost) == len(known)
-            failed.append(j.claim.short + ("" if everywhere else f" ({', '.join(lost)})"))
+            kept = [NAMES[s] for s in SOURCES if words[s] == "holds"]
+            where = ", ".join(lost) + (f"; holds in {', '.join(kept)}" if kept else "")
+            failed.append(j.claim.short + ("" if len(lost) == len(known) else f" ({where})"))
         elif "holds" in known:
             held.append(j.claim.short)
         else:
@@ -121,10 +122,13 @@ def box(found: Mapping[str, Any], report: str = "results/REPORT.md") -> str:
     share = 100 * found["runs_done"] / found["runs_of_grid"]
     words = [claim["verdicts"]["released"]["word"] for claim in found["claims"]]
     held, lost = words.count("holds"), words.count("fails") + words.count("false")
+    against = "; ".join(claim["claim"] for claim, word in zip(found["claims"], words)
+                        if word in ("fails", "false"))
     runs, grid = found["runs_done"], found["runs_of_grid"]
     lines = [f"{runs} of the grid's {grid} runs are done ({share:.0f} "
              f"%). Of {len(words)} claims, `released` confirms {held}, contradicts {lost} and "
-             f"leaves {len(words) - held - lost} open.",
+             f"leaves {len(words) - held - lost} open."
+             + (f" Contradicted: {against}." if against else ""), "",
              "n is the number of seeds behind each verdict, in the order of the columns. Words in "
              "quotation marks are the paper's.", "",
              "| claim of the paper | " + " | ".join(NAMES[s] for s in SOURCES) + " | n |",

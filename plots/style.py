@@ -159,7 +159,8 @@ def _smaller(text: str) -> str:
     text = text.replace("<svg ", "<svg font-family=\"'DejaVu Sans', Verdana, sans-serif\" ", 1)
     used = set(re.findall(r'(?:url\(|href=")#([^")]+)', text))
     text = re.sub(r' id="([^"]+)"', lambda x: x[0] if x[1] in used else "", text)
-    return _with_classes(re.sub(r"([:;]) ", r"\1", text))
+    return _with_classes(re.sub(r' style="[^"]*"', lambda style: re.sub(r"([:;]) ", r"\1", style[0]),
+                                text))
 
 
 def _with_classes(text: str) -> str:

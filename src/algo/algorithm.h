@@ -111,8 +111,8 @@ class Stages {
   virtual std::vector<std::string> StageNames() const = 0;
   /// Loss of a stage on a batch; adds its gradients to Params(). `fixed` may be null.
   virtual LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) = 0;
-  /// Clips the gradients, steps the optimiser by the stage's idle rule and zeroes the gradients.
-  /// Returns the global norm before clipping.
+  /// Clips the gradients, steps the optimiser by the idle rule (`adam_idle`) and zeroes the
+  /// gradients. Returns the global norm before clipping.
   virtual double Step(int stage) = 0;
   /// The tensors that the stage's loss can reach, by position in Params().
   virtual std::vector<char> InGraph(int stage) const = 0;

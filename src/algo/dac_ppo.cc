@@ -26,7 +26,7 @@ class DacPpo final : public DoubleActorCritic {
     nets_.Master(s, c);
     nets_.CallAndReturn(s, o_prev, init, c.pi, switches_.beta_index, c);
     if (when == When::kUpdate && switches_.dac_update_mask == Fidelity::kReleased) {
-      // Every o' of the batch is marked in the first row, none in the others; spec 4.6 (g)
+      // Every o' of the minibatch is marked in its first sample, none in the others; spec 4.6 (g)
       c.M.col(0) = c.M.rowwise().maxCoeff();
       c.M.rightCols(c.M.cols() - 1).setZero();
       CallAndReturn(c.pi, c.beta.beta, c.M, o_prev, init, switches_.beta_index, c.pi_hat);

@@ -149,8 +149,7 @@ void Iopg::Serialize(StateVisitor& v) {
     v.Matrix(name + "a", worker.a);
     v.Doubles(name + "r", worker.r);
     v.AllBelow(name + "init", worker.init, 2);
-    v.Within(0, worker.r.size());
-    v.Int(name + "length", worker.length);
+    v.Below(name + "length", worker.length, worker.r.size() + 1);
     v.Below(name + "o_prev", worker.o_prev, K_);
   }
 }
@@ -381,9 +380,9 @@ LossTerms Iopg::EpisodeLoss(OptionNets& nets, const ConstMatRef& s, const ConstM
     R = r[std::size_t(t)] + gamma_ * R;
     h.R(t) = R;
     const double A_t = R - h.v(t);
-    const double log_c = switches_.density_log_eps == Fidelity::kReleased
-                             ? std::log(std::exp(h.log_c(t)) + kLogEps)
-                             : h.log_c(t);
+    // ln(c + 1e-5) is ln c where c is large; e^x would overflow.
+    const bool add = switches_.density_log_eps == Fidelity::kReleased && h.log_c(t) < kLargeLog;
+    const double log_c = add ? std::log(std::exp(h.log_c(t)) + kLogEps) : h.log_c(t);
     terms.surrogate -= A_t * log_c / double(n);
     terms.value += 0.5 * A_t * A_t / double(n);
     h.dv(t) = -A_t / double(n);

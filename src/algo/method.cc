@@ -19,14 +19,14 @@ void Method::RecordOptions(Index column, std::span<const int> o, std::span<const
 }
 
 const std::vector<SumAndCount>& Method::Report() {
-  ratios_.clear();
+  statistics_.clear();
   for (LossMeans& means : means_) {
-    means.Report(ratios_);
+    means.Report(statistics_);
     means.Clear();
   }
-  usage_.Report(ratios_);
+  usage_.Report(statistics_);
   usage_.Clear();
-  return ratios_;
+  return statistics_;
 }
 
 std::vector<std::string> Method::StatNames() const {

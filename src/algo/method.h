@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "algo/algorithm.h"
+#include "algo/losses.h"
 #include "algo/option_nets.h"
 #include "algo/statistics.h"
-#include "algo/losses.h"
 #include "base/flush_subnormals.h"
 #include "nn/activation.h"
 #include "nn/adam.h"
@@ -111,8 +111,8 @@ class Method : public Algorithm {
   const std::vector<std::string> stages_;
   const LossColumns more_;
   std::unique_ptr<Adam> adam_;
-  std::vector<LossMeans> means_;     // of each stage
-  std::vector<SumAndCount> ratios_;  // of the last Report
+  std::vector<LossMeans> means_;         // of each stage
+  std::vector<SumAndCount> statistics_;  // of the last Report
 };
 
 /// `activation` of a method's numbers, tanh or relu.

@@ -32,7 +32,8 @@ void SortByOption(std::span<const int> o, Index K, std::vector<int>& sample,
 
 }  // namespace
 
-// ---- Bank ---------------------------------------------------------------------------------------
+// ---- One network an option
+// ---------------------------------------------------------------------------------------
 
 PerOptionMlps::PerOptionMlps(const std::string& name, Index K, Index S, Index h, Index n_out,
                              Activation activation, const Initialiser& init) {

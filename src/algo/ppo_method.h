@@ -9,13 +9,14 @@
 
 namespace o2v {
 
-/// B states and what was chosen there.
+/// B states and what was chosen there: views, valid until the method acts or draws again. Values
+/// leaves what they show alone.
 struct Choices {
   ConstMatRef s;                // (S, B)
   std::span<const int> o_prev;  // (B) the options before
   std::span<const char> init;   // (B) first states of episodes
-  std::span<const int> o;       // (B) options drawn
-  ConstMatRef P;                // (K, B) probabilities they were drawn with, else empty
+  std::span<const int> o;       // (B) options drawn, empty where none are
+  ConstMatRef P;                // (K, B) probabilities they were drawn with: two-stage methods
 };
 
 /// PPO around what a method supplies: how it acts, what a state is worth, its loss. Source: spec

@@ -35,9 +35,9 @@ void LossMeans::Add(const LossTerms& terms, double grad_norm) {
   ++n_;
 }
 
-void LossMeans::Report(std::vector<SumAndCount>& ratios) const {
-  for (const double sum : sums_) ratios.push_back({sum, double(n_)});
-  ratios.push_back({grad_norm_, double(n_)});
+void LossMeans::Report(std::vector<SumAndCount>& values) const {
+  for (const double sum : sums_) values.push_back({sum, double(n_)});
+  values.push_back({grad_norm_, double(n_)});
 }
 
 void LossMeans::Names(const std::string& stage, std::vector<std::string>& names,
@@ -56,10 +56,10 @@ void OptionUsage::Count(int o, int o_prev, bool init) {
   begun_[std::size_t(o)] += init || o != o_prev;
 }
 
-void OptionUsage::Report(std::vector<SumAndCount>& ratios) const {
+void OptionUsage::Report(std::vector<SumAndCount>& values) const {
   const double steps = std::accumulate(executed_.begin(), executed_.end(), 0.0);
-  for (const double n : executed_) ratios.push_back({n, steps});
-  for (std::size_t k = 0; k < executed_.size(); ++k) ratios.push_back({executed_[k], begun_[k]});
+  for (const double n : executed_) values.push_back({n, steps});
+  for (std::size_t k = 0; k < executed_.size(); ++k) values.push_back({executed_[k], begun_[k]});
 }
 
 void OptionUsage::Names(std::vector<std::string>& names) const {

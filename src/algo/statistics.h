@@ -21,7 +21,7 @@ class LossMeans {
   void Add(const LossTerms& terms, double grad_norm);
   /// Appends total, surrogate, value, entropy, kl, clip_fraction, the other columns and grad_norm,
   /// in the order of Names.
-  void Report(std::vector<SumAndCount>& ratios) const;
+  void Report(std::vector<SumAndCount>& values) const;
   /// The columns of `stage`.
   static void Names(const std::string& stage, std::vector<std::string>& names,
                     const LossColumns& more = {});
@@ -44,7 +44,7 @@ class OptionUsage {
   /// Appends each option's share of the steps, then the mean length [steps] of its executions: its
   /// steps by the executions that began. Cut anywhere and added up again they are the same: an
   /// execution counts once, where it began, and its steps where they are.
-  void Report(std::vector<SumAndCount>& ratios) const;
+  void Report(std::vector<SumAndCount>& values) const;
   /// The columns of Report.
   void Names(std::vector<std::string>& names) const;
 

@@ -21,9 +21,10 @@ enum class Freeze {
   kNone,
 };
 
-/// All switches of spec 8. Each acts in one file, two apart: timelimit wherever a method values a
-/// step that the time limit ended (PpoCore, IOPG, OC), density_log_eps wherever one takes the
-/// logarithm of a density or probability (LogDensity, OptionLog, IOPG).
+/// All switches of spec 8. Most act in one file. Several: timelimit where a method values a step
+/// that the time limit ended (PpoMethod, OC, IOPG); density_log_eps where one takes the logarithm
+/// of a density or probability (LogDensity, OptionLog, IOPG); beta_index (DAC+PPO, PPOC, OC, IOPG);
+/// adam_idle (Method, Option2Vec); switch_init_flag (trainer, IOPG).
 struct Switches {
   Fidelity timelimit = Fidelity::kPaper;             // bootstrap at truncation | terminal
   double adv_std_eps = 1e-8;                         // added to the advantages' std | 0

@@ -21,7 +21,8 @@ class TwoStageMethod : public PpoMethod {
  protected:
   enum Stage { kOption = 0, kAction = 1 };
 
-  /// (K, B) what an option is drawn with, not always normalised, and its logarithm.
+  /// (K, B) what an option is drawn with, not always normalised, and its logarithm. Valid until
+  /// Options is asked again for as many states.
   struct OptionDistribution {
     const Mat &P, &log_P;
   };

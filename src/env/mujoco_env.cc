@@ -200,7 +200,8 @@ void MujocoEnv::Diverged(const std::string& what) const {
 }
 
 // mj_step computes everything that it reads from these and the controls, and the observation and
-// the gauge are those of the last step: no forward call is needed, and saving changes nothing.
+// the reward quantity are those of the last step: no forward call is needed, and saving changes
+// nothing.
 void MujocoEnv::Serialize(StateVisitor& v, const std::string& prefix) {
   v.Double(prefix + "time", data_->time);
   v.Doubles(prefix + "qpos", data_->qpos, qpos().size());

@@ -91,8 +91,8 @@ class MujocoEnv : public Env {
   /// The one number of a state that the reward of the next step reads (a position, a distance). It
   /// is taken after a reset and after each step, when it is as stale as in the reference.
   virtual double RewardQuantity() const { return 0; }
-  /// Reward and end of the step that has just been simulated with a (A); gauges before and after
-  /// it.
+  /// Reward and end of the step that has just been simulated with a (A); before, after: the reward
+  /// quantity at both ends of it.
   virtual Outcome RewardAndEnd(double before, double after, std::span<const double> a) const = 0;
   virtual void Observe(ObservationWriter& obs) const = 0;
 
@@ -117,9 +117,10 @@ class MujocoEnv : public Env {
   static std::unique_ptr<mjModel, Delete> Load(const std::string& name);
 
   int Id(mjtObj type, const char* name) const;
-  void Clear();                        // all that an episode leaves behind but qpos and qvel
-  void Begin(std::span<double> obs);   // an episode at the current qpos, qvel
-  void Finish(std::span<double> obs);  // of a reset or step: contact forces, gauge, observation
+  void Clear();                       // all that an episode leaves behind but qpos and qvel
+  void Begin(std::span<double> obs);  // an episode at the current qpos, qvel
+  void Finish(
+      std::span<double> obs);  // of a reset or step: contact forces, reward quantity, observation
   void CheckWarnings() const;
   [[noreturn]] void Diverged(const std::string& what) const;
 

@@ -97,12 +97,12 @@ void RunLogs::AddEpisode(const Episode& e) {
                  Decimal(e.terminated), Decimal(e.truncated)});
 }
 
-void RunLogs::AddUpdate(std::int64_t step, std::span<const SumAndCount> ratios) {
-  Check(Index(ratios.size()) == sums_.size(), "updates.csv: got ", ratios.size(), " numbers for ",
-        sums_.size(), " columns");
-  for (std::size_t i = 0; i < ratios.size(); ++i) {
-    sums_(Index(i)) += ratios[i].sum;
-    ns_(Index(i)) += ratios[i].n;
+void RunLogs::AddUpdate(std::int64_t step, std::span<const SumAndCount> statistics) {
+  Check(Index(statistics.size()) == sums_.size(), "updates.csv: got ", statistics.size(),
+        " numbers for ", sums_.size(), " columns");
+  for (std::size_t i = 0; i < statistics.size(); ++i) {
+    sums_(Index(i)) += statistics[i].sum;
+    ns_(Index(i)) += statistics[i].n;
   }
   step_ = step;
   if (step_ - row_step_ >= kRowSteps) EndUpdates();

@@ -58,7 +58,7 @@ class RunLogs {
   void AddEpisode(const Episode& episode);
   /// The statistics of the update at `step`. A row is written, with the values of the sums of the
   /// updates since the last row, once kRowSteps have passed since that.
-  void AddUpdate(std::int64_t step, std::span<const SumAndCount> ratios);
+  void AddUpdate(std::int64_t step, std::span<const SumAndCount> statistics);
   /// No update follows: writes a row of those since the last one.
   void EndUpdates();
   void AddEval(std::int64_t step, int episode, double ret);

@@ -28,7 +28,7 @@ RunParts PartsOf(const RunConfig& config);
 
 /// Moments at which a run can be interrupted from outside; each may be empty.
 struct RunHooks {
-  // QueryCache after each iteration and each step of an evaluation; true ends the run, resumable.
+  // Asked after each iteration and each step of an evaluation; true ends the run, resumable.
   std::function<bool()> stop;
   std::function<void()>
       before_checkpoint;                // the logs are flushed, the checkpoint is still the old one

@@ -10,7 +10,7 @@
 
 namespace o2v {
 
-/// MlpTrunk(n_in, h): Linear(n_in -> h), g, Linear(h -> h), g. Source: spec 2.1.
+/// MlpTrunk(n_in, h): Linear(n_in -> h), g, Linear(h -> h), g. Source: spec 2.1, whose Body it is.
 struct MlpTrunk {
   Linear layer0, layer1;
   Activation g = Activation::kTanh;

@@ -10,10 +10,10 @@ void Batch::Resize(Index S, Index A, Index B) {
   o.resize(n);
   o_prev.resize(n);
   init.resize(n);
-  for (StageTargets* stream : {&option, &action}) {
-    stream->logp_old.resize(B);
-    stream->adv_hat.resize(B);
-    stream->ret.resize(B);
+  for (StageTargets* targets : {&option, &action}) {
+    targets->logp_old.resize(B);
+    targets->adv_hat.resize(B);
+    targets->ret.resize(B);
   }
 }
 
@@ -35,9 +35,9 @@ void Gather(const Batch& all, std::span<const int> rows, Batch& out) {
   entries(all.o, out.o);
   entries(all.o_prev, out.o_prev);
   entries(all.init, out.init);
-  for (auto stream : {&Batch::option, &Batch::action}) {
-    const StageTargets& from = all.*stream;
-    StageTargets& to = out.*stream;
+  for (auto targets : {&Batch::option, &Batch::action}) {
+    const StageTargets& from = all.*targets;
+    StageTargets& to = out.*targets;
     entries(from.logp_old, to.logp_old);
     entries(from.adv_hat, to.adv_hat);
     entries(from.ret, to.ret);

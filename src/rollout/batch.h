@@ -24,7 +24,7 @@ struct Batch {
   StageTargets option, action;  // single-stage methods use `action`
 
   // Kept by the methods that need them, else empty.
-  Mat P_old;  // (K, B) probabilities that the options were drawn with: DAC, DAC-OneStep
+  Mat P_old;  // (K, B) probabilities that the options were drawn with: two-stage methods
   std::vector<char> stop;  // (B) the previous option was stopped: AHP
   VecD r, mask;  // (B) rewards; 0 where an episode ended: targets that the loss computes (OC, IOPG)
   Mat s_end;     // (S, N) states after the rollout: OC

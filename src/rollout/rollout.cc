@@ -16,6 +16,7 @@ bool RecordEnds(const Transition& transition, int t, MatD& mask) {
 Rollout::Rollout(Index S, Index A, int N, int T, int n_critics)
     : mask(MatD::Ones(N, T)), critics(std::size_t(n_critics), CriticTargets(N, T)) {
   batch.Resize(S, A, Index(N) * T);
+  batch.P_old.resize(0, batch.Size());
 }
 
 bool Rollout::RecordStep(const Transition& transition, int t) {

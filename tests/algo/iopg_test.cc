@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "algo/setup.h"
 
 namespace o2v {
@@ -16,6 +18,46 @@ TEST(Iopg, RefusesEpisodesLongerThanTwoTimeLimits) {
   std::vector<Episode> episodes;
   EXPECT_THROW(iopg->Collect(env, episodes), Error);
   EXPECT_EQ(env.TotalSteps(), 2 * 8);
+}
+
+/// Shows every worker's episode as `length` steps long.
+class Lengths final : public StateVisitor {
+ public:
+  explicit Lengths(std::int64_t length) : length_(length) {}
+  void Matrix(std::string_view, Mat&) override {}
+  void Doubles(std::string_view, double*, std::size_t) override {}
+  void Ints(std::string_view name, std::int64_t* x, std::size_t) override {
+    if (name.ends_with(".length")) *x = length_;
+  }
+
+ private:
+  const std::int64_t length_;
+};
+
+TEST(Iopg, RefusesAStateWhoseEpisodeIsLongerThanItsRoom) {
+  EnvSpec spec = Sizes(5, 3);
+  spec.time_limit = 4;  // room for 8
+  const auto iopg = MakeRunAlgorithm(SmallConfig("iopg", Fidelity::kPaper), spec);
+  Lengths room(8), more(9);
+  EXPECT_NO_THROW(iopg->Serialize(room));
+  EXPECT_THROW(iopg->Serialize(more), Error);
+}
+
+TEST(Iopg, ReportsTheLossOfDensitiesBeyondTheRangeOfExponentials) {
+  // All weights 0: mu = a = 0, v = 0, and all options alike; c = N(0; 0, sigma^2) in A dimensions.
+  constexpr Index A = 40, n = 4;
+  const RunConfig config = SmallConfig("iopg", Fidelity::kReleased);
+  const auto iopg = MakeRunAlgorithm(config, Sizes(5, A));
+  for (Param* p : iopg->Params()) p->value.setConstant(p->name.ends_with(".rho") ? -60 : 0);
+  Rng rng(5, "episode");
+  Batch episode = RandomBatch(5, A, 4, n, rng);
+  episode.a.setZero();
+  episode.r = VecD::Unit(n, n - 1);  // R_t = A_t = gamma^(n - 1 - t)
+  double sum = 0;
+  for (int t = 0; t < n; ++t) sum += std::pow(config.hyper.Real("gamma"), t);
+  const double log_c = double(A) * (60 - 0.5 * std::log(2 * M_PI));  // sigma = e^-60; 2363
+  const double expected = -sum / double(n) * log_c;
+  EXPECT_NEAR(iopg->Loss(0, episode, nullptr).surrogate / expected, 1, 1e-5);
 }
 
 /// The gradients that an episode of n steps, always the same one, leaves behind.

@@ -42,10 +42,10 @@ inline Batch RandomBatch(Index S, Index A, int K, Index B, Rng& rng) {
     }
     if (batch.init[i] && b >= kWorkers) batch.mask(b - kWorkers) = 0;
   }
-  for (StageTargets* stream : {&batch.option, &batch.action}) {
-    stream->logp_old = RandomMat(B, 1, rng, 0.2).array() - Real(2);
-    stream->adv_hat = RandomMat(B, 1, rng);
-    stream->ret = RandomMat(B, 1, rng);
+  for (StageTargets* targets : {&batch.option, &batch.action}) {
+    targets->logp_old = RandomMat(B, 1, rng, 0.2).array() - Real(2);
+    targets->adv_hat = RandomMat(B, 1, rng);
+    targets->ret = RandomMat(B, 1, rng);
   }
   batch.r = RandomMat(B, 1, rng).cast<double>();
   batch.s_end = RandomMat(S, kWorkers, rng);

@@ -128,13 +128,13 @@ void PpoProblem::Ask(const Batch& batch, const std::string& tensor, Says& x) {
 
 Wide PpoProblem::Loss(int stage, const Batch& batch, const Says& now, const Says& base) {
   const Index B = batch.Size();
-  const StageTargets& stream =
+  const StageTargets& targets =
       Has(setup_.method, "dac_") && stage == 0 ? batch.option : batch.action;
   Wide sum = 0;
   for (Index b = 0; b < B; ++b) {
-    const Wide r = std::exp(LogProb(stage, batch, now, b) - stream.logp_old(b));
-    const Wide clipped = std::clamp<Wide>(r, 1 - kClip, 1 + kClip), A = stream.adv_hat(b);
-    const Wide error = Prediction(stage, batch, now, b) - stream.ret(b);
+    const Wide r = std::exp(LogProb(stage, batch, now, b) - targets.logp_old(b));
+    const Wide clipped = std::clamp<Wide>(r, 1 - kClip, 1 + kClip), A = targets.adv_hat(b);
+    const Wide error = Prediction(stage, batch, now, b) - targets.ret(b);
     sum += error * error / 2 - std::min(r * A, clipped * A);
   }
   return sum / B + Extra(stage, batch, now, base);
@@ -180,10 +180,10 @@ void PpoProblem::Fill() {
   Says x;
   Ask(batch_, "", x);
   for (int stage = 0; stage < int(algo_->StageNames().size()); ++stage) {
-    StageTargets& stream =
+    StageTargets& targets =
         algo_->StageNames().size() == 2 && stage == 0 ? batch_.option : batch_.action;
     for (int b = 0; b < kB; ++b) {
-      Place(stream, b, double(LogProb(stage, batch_, x, b)),
+      Place(targets, b, double(LogProb(stage, batch_, x, b)),
             double(Prediction(stage, batch_, x, b)));
     }
   }

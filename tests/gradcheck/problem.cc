@@ -94,11 +94,11 @@ Problem::Problem(const Setup& setup, std::uint64_t seed)
 
 bool Problem::IsClipped(int b) { return b % 8 == 3 || b % 8 == 4; }
 
-void Problem::Place(StageTargets& stream, int b, double log_prob, double value) {
+void Problem::Place(StageTargets& targets, int b, double log_prob, double value) {
   constexpr double kRatios[] = {0.6, 0.9, 1.1, 1.5};  // outside and inside 1 -+ 0.2
-  stream.logp_old(b) = log_prob - std::log(kRatios[b % 4] * rng_.Uniform(0.98, 1.02));
-  stream.adv_hat(b) = (b / 4 % 2 ? -1 : 1) * rng_.Uniform(0.5, 2);
-  stream.ret(b) = value + rng_.Uniform(0.2, 0.5);
+  targets.logp_old(b) = log_prob - std::log(kRatios[b % 4] * rng_.Uniform(0.98, 1.02));
+  targets.adv_hat(b) = (b / 4 % 2 ? -1 : 1) * rng_.Uniform(0.5, 2);
+  targets.ret(b) = value + rng_.Uniform(0.2, 0.5);
 }
 
 void Problem::Sample(int b, Batch& sample, FixedDraws&) const {

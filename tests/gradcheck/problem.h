@@ -61,7 +61,7 @@ class Problem {
   static bool Released(Fidelity f) { return f == Fidelity::kReleased; }
   /// Puts sample b at a distance from its choice's log-probability and from its value; every
   /// combination of side and sign comes in eight samples.
-  void Place(StageTargets& stream, int b, double log_prob, double value);
+  void Place(StageTargets& targets, int b, double log_prob, double value);
   /// Whether Place puts the sample where the surrogate is flat.
   static bool IsClipped(int b);
   Mat& Tensor(const std::string& name);

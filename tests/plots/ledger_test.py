@@ -33,7 +33,8 @@ class LedgerTest(unittest.TestCase):
             judged("q5", authors=UNMEASURED, released=UNDECIDED, paper=UNMEASURED)])
         self.assertEqual(
             text, "**Held:** the theorems and propositions in the sense that is true; Option2Vec "
-            "above DAC-OneStep. **Failed:** first on five of six pairs (`released`, `paper`); "
+            "above DAC-OneStep. **Failed:** first on five of six pairs (`released`, `paper`; holds in "
+            "authors' logs); "
             "Proposition 3.2 as printed. **Undecided:** growing option durations.")
 
     def test_anchors_are_the_same_for_good(self):
@@ -58,9 +59,13 @@ class LedgerTest(unittest.TestCase):
         found = {"runs_done": 640, "runs_of_grid": 2560, "beyond_the_paper": [
             {"question": "Why?", "report": "why", "answers": {"released": "yes", "paper": "no"}}],
             "claims": [{"claim": "C", "report": "c", "verdicts": verdicts}]}
+        lost = {"claim": "D", "report": "d", "verdicts": verdicts | {
+            "released": {"word": "false", "literally": "", "seeds": [3]}}}
         lines = ledger.box(found).splitlines()
         self.assertEqual(lines[0], "640 of the grid's 2560 runs are done (25 %). Of 1 claims, "
                          "`released` confirms 1, contradicts 0 and leaves 0 open.")
+        both = found | {"claims": [lost, *found["claims"], lost | {"claim": "E"}]}
+        self.assertIn("contradicts 2 and leaves 0 open. Contradicted: D; E.\n", ledger.box(both))
         self.assertEqual(lines[-2:], [
             "| [C](results/REPORT.md#c) | unmeasured | holds | fails | - · 3-10 · 5 |",
             "| *Ours:* [Why?](results/REPORT.md#why) | - | yes | no | - |"])
