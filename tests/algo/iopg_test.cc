@@ -21,9 +21,9 @@ TEST(Iopg, RefusesEpisodesLongerThanTwoTimeLimits) {
 }
 
 /// Shows every worker's episode as `length` steps long.
-class Lengths final : public StateVisitor {
+class LengthSetter final : public StateVisitor {
  public:
-  explicit Lengths(std::int64_t length) : length_(length) {}
+  explicit LengthSetter(std::int64_t length) : length_(length) {}
   void Matrix(std::string_view, Mat&) override {}
   void Doubles(std::string_view, double*, std::size_t) override {}
   void Ints(std::string_view name, std::int64_t* x, std::size_t) override {
@@ -38,7 +38,7 @@ TEST(Iopg, RefusesAStateWhoseEpisodeIsLongerThanItsRoom) {
   EnvSpec spec = Sizes(5, 3);
   spec.time_limit = 4;  // room for 8
   const auto iopg = MakeRunAlgorithm(SmallConfig("iopg", Fidelity::kPaper), spec);
-  Lengths room(8), more(9);
+  LengthSetter room(8), more(9);
   EXPECT_NO_THROW(iopg->Serialize(room));
   EXPECT_THROW(iopg->Serialize(more), Error);
 }
