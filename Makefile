@@ -106,13 +106,13 @@ PYTHON := /usr/bin/python3 -B
 CHOICE  = $(addprefix --experiment ,$(EXPERIMENTS))
 # The program writes its tables where it is newer than they are; a fresh clone has them, unbuilt.
 results/params.csv: ARGUMENTS = params --csv
-results/switches.txt: ARGUMENTS = list switches
-results/params.csv results/switches.txt: $(wildcard $(O2V))
+results/registry.json: ARGUMENTS = list --json
+results/params.csv results/registry.json: $(wildcard $(O2V))
 	@[ -x $(O2V) ] || { scripts/deps.sh && $(COMPILE) --target option2vec; }
 	@$(O2V) $(ARGUMENTS) > $@.new && mv $@.new $@
 
 PLOTTING := python3 python3-numpy python3-scipy python3-matplotlib
-report: results/params.csv results/switches.txt  ## write results/REPORT.md, report.html, README's box (EXPERIMENTS=ci: in results/ci; MINE=)
+report: results/params.csv results/registry.json  ## write results/REPORT.md, report.html, README's box (EXPERIMENTS=ci: in results/ci; MINE=)
 	@scripts/deps.sh $(PLOTTING)
 	@$(PYTHON) -m plots.long_table
 	@$(PYTHON) -m plots.report $(CHOICE) $(addprefix --mine ,$(MINE)) \

@@ -480,18 +480,22 @@ def _theory(theory: Rows) -> list[Block]:
 # ---- Deviations, missing runs
 
 
+def _methods(ids: Sequence[str]) -> str:
+    return "all" if set(ids) == set(METHODS) else ", ".join(ids)
+
+
 def _deviations(switches: Rows, cells: Mapping[Key, Cell], authors: Samples) -> list[Block]:
     if not switches:
-        return [Paragraph("No results/switches.txt yet (`make report` writes it).")]
+        return [Paragraph("No results/registry.json yet (`make report` writes it).")]
     rows = []
     for s in switches:
         meanings = s["effect"].split(" | ")  # of paper, released, further values; or of the switch
         paper, released, *others = meanings if len(meanings) > 1 else (
             f"{s['paper']} ({meanings[0]})", s["released"])
-        rows.append([s["switch"], s["methods"].replace(",", ", "), paper, released,
+        rows.append([s["id"], _methods(s["methods"]), paper, released,
                      "; ".join(others) or "-",
-                     *(_ran(s["switch"], f, cells) for f in FIDELITIES),
-                     "; ".join(_effects(s["switch"], cells)) or "not measured"])
+                     *(_ran(s["id"], f, cells) for f in FIDELITIES),
+                     "; ".join(_effects(s["id"], cells)) or "not measured"])
     return [Paragraph("Every difference between the paper and the released code in what is "
                       "computed is a switch; differences in sizes are in the second table. Runs: "
                       "the values in the records, with their number. Effect: return with the "
@@ -499,7 +503,7 @@ def _deviations(switches: Rows, cells: Mapping[Key, Cell], authors: Samples) -> 
                       "fidelity has them (Student's t of the pairs)."),
             Table(["switch", "methods", "the paper", "the released code", "other values",
                    "our `paper` runs", "our `released` runs", "measured effect"], rows),
-            *_sizes(cells), *_numbers({s["switch"] for s in switches}, cells, authors)]
+            *_sizes(cells), *_numbers({s["id"] for s in switches}, cells, authors)]
 
 
 def _sizes(cells: Mapping[Key, Cell]) -> list[Block]:

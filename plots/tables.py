@@ -1,7 +1,6 @@
 """Reads the tables of results/ that are not records; where a file is absent, there are no rows."""
 
 import json
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,19 +60,17 @@ def read_bench(results: Path) -> Rows:
 
 
 def read_switches(results: Path) -> Rows:
-    """Rows of results/switches.txt, as `option2vec list switches` prints them: columns are two
-    spaces apart."""
-    path = results / "switches.txt"
+    """The switches of results/registry.json, as `option2vec list --json` prints it."""
+    path = results / "registry.json"
     if not path.is_file():
         return []
-    columns = ["switch", "paper", "released", "takes", "methods", "effect"]
-    rows = []
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
-        cells = re.split(r"  +", line.strip())
-        if len(cells) != len(columns) or (number == 1 and cells != columns):
-            raise DamagedFile(f"{path}:{number}: not the columns {', '.join(columns)}")
-        rows.append(dict(zip(columns, cells)))
-    return rows[1:]
+    try:
+        rows = json.loads(path.read_text(encoding="utf-8"))["switches"]
+        return [{key: row[key] for key in ("id", "paper", "released", "methods", "effect")}
+                for row in rows]
+    except (KeyError, TypeError, ValueError) as error:
+        raise DamagedFile(f"{path}: not the output of `option2vec list --json`: {error!r}"
+                          ) from None
 
 
 @dataclass(frozen=True)

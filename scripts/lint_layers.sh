@@ -18,7 +18,7 @@ find src -name '*.cc' -o -name '*.h' | sort | xargs awk '
     # Where third-party headers may appear; Eigen and the standard library may appear anywhere.
     home["mujoco"] = "^src/(env|render)/"
     home["toml++"] = "^src/harness/config\\.cc$"
-    home["nlohmann"] = "^src/harness/(manifest|checkpoint|record|interpret)\\.cc$"
+    home["nlohmann"] = "^src/(harness/(manifest|checkpoint|record|interpret)|cli/list)\\.cc$"
     home["CLI"] = "^src/cli/"
   }
   /^[ \t]*#[ \t]*include[ \t]*"/ {

@@ -21,30 +21,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from option2vec_results.standard import differences, settings_of, standard, toml
+from option2vec_results.standard import differences, registry, settings_of, standard, toml
 
 INFINITE = ("HalfCheetah-v2", "Swimmer-v2", "HumanoidStandup-v2", "Reacher-v2")  # never terminate
 FINITE = ("Walker2d-v2", "Hopper-v2", "InvertedPendulum-v2", "InvertedDoublePendulum-v2", "Ant-v2",
           "Humanoid-v2")
 TASKS = INFINITE + FINITE
-PAIRS = {
-    "CartPole": "dm-cartpole-balance,dm-cartpole-balance_sparse",
-    "Reacher": "dm-reacher-easy,dm-reacher-hard",
-    "Cheetah": "dm-cheetah-run,dm-cheetah-backward",
-    "Fish": "dm-fish-upright,dm-fish-downleft",
-    "Walker1": "dm-walker-squat,dm-walker-stand",
-    "Walker2": "dm-walker-walk,dm-walker-backward",
-}
-METHODS = {  # id: name in the authors' tables
-    "option2vec": "Option2Vec",
-    "dac_onestep": "DAC-OneStep",
-    "dac_ppo": "DAC+PPO",
-    "ahp_ppo": "AHP+PPO",
-    "iopg": "IOPG",
-    "ppoc": "PPOC",
-    "oc": "OC",
-    "ppo": "PPO",
-}
+PAIRS = {p["name"]: f"{p['first']},{p['second']}" for p in registry()["pairs"]}
+METHODS = {m["id"]: m["name"] for m in registry()["algorithms"]}  # names in the authors' tables
 FIDELITIES = ("paper", "released")
 SEEDS = range(10)  # of a whole grid
 MILLION = 1_000_000  # [environment steps] of training on a task

@@ -1,5 +1,6 @@
 """What the place of a record says of its configuration; src/harness/record.cc has the same rule."""
 
+import json
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -47,6 +48,12 @@ def toml(key: str, value: Any) -> str:
 
 
 @cache
+def registry() -> dict[str, list[dict[str, Any]]]:
+    """What the program knows, by `option2vec list --json`: tasks, pairs, algorithms, switches."""
+    return json.loads((FOLDER / "registry.json").read_text(encoding="utf-8"))
+
+
+@cache
 def _config(name: str) -> dict[str, Any]:
     path = FOLDER / "paper_configs" / f"{name}.toml"
     return tomllib.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
@@ -54,11 +61,7 @@ def _config(name: str) -> dict[str, Any]:
 
 @cache
 def _switches(fidelity: str) -> dict[str, Any]:
-    """Of `option2vec list switches`: columns switch, paper, released, ..."""
-    lines = (FOLDER / "switches.txt").read_text(encoding="utf-8").splitlines()
-    rows = [re.split(r"  +", line) for line in lines]
-    column = rows[0].index(fidelity)
-    return {row[0]: _value(row[column]) for row in rows[1:]}
+    return {s["id"]: _value(s[fidelity]) for s in registry()["switches"]}
 
 
 def _flatten(section: Mapping[str, Any], names: list[str]) -> dict[str, Any]:

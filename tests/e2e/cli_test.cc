@@ -31,6 +31,11 @@ std::string Squeezed(const std::string& text) {
   return squeezed;
 }
 
+std::string WithoutSpaces(std::string text) {
+  std::erase_if(text, [](char c) { return c == ' ' || c == '\n'; });
+  return text;
+}
+
 TEST_F(Program, HelpWithExamplesSucceedsForEverySubcommand) {
   EXPECT_EQ(Run("--help").code, 0);
   for (const char* name :
@@ -72,6 +77,25 @@ TEST_F(Program, AnUnreadableCheckpointExitsWith1AndOneLine) {
   const Outcome outcome = Run("eval --checkpoint x.ckpt --task Hopper-v2");
   EXPECT_EQ(outcome.code, 1);
   EXPECT_PRED1(OneLine, outcome.err);
+}
+
+TEST_F(Program, ListsForOtherProgramsAreJson) {
+  const std::string all = Run("list --json").out;
+  // Python reads the committed copy.
+  EXPECT_EQ(all, ReadFile(O2V_SOURCE_DIR "/results/registry.json")) << "run `make report`";
+  for (const char* entry :
+       {R"({"id":"Reacher-v2","S":11,"A":2,"limit":50})",
+        R"({"name":"Fish","first":"dm-fish-upright","second":"dm-fish-downleft"})",
+        R"("name":"Option2Vec","revision":1,"options":true,"embedding":true})",
+        R"("name":"DAC+PPO","revision":1,"options":true,"embedding":false})",
+        R"("name":"PPO","revision":1,"options":false,"embedding":false})",
+        R"("takes":"paper,released","methods":["dac_ppo","iopg","ppoc","oc"])"}) {
+    EXPECT_NE(WithoutSpaces(all).find(entry), std::string::npos) << entry;
+  }
+  const std::string methods = WithoutSpaces(Run("list algorithms --json").out);
+  EXPECT_TRUE(methods.starts_with(R"({"algorithms":[{"id":"option2vec",)")) << methods;
+  EXPECT_EQ(methods.find("Reacher"), std::string::npos);
+  EXPECT_EQ(Run("list").code, 2);
 }
 
 TEST_F(Program, ListsNameTasksMethodsAndSwitches) {

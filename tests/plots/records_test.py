@@ -9,7 +9,7 @@ import numpy as np
 from plots.records import METHODS, DamagedFile, Key, load_cells
 from plots.samples import author_samples, mean_duration, original_code, our_samples
 from plots.tables import read_bench, read_interpretations, read_rows, read_switches
-from tree import ROOT, write_run
+from tree import REGISTRY, ROOT, write_run
 
 TASK = "Hopper-v2"
 
@@ -246,15 +246,14 @@ class TablesTest(InFolder):
         (self.results / "bench.json").write_text('{"benchmarks": [\n{"name": "step/A/ppo/paper/5"')
         self.refuses(r"bench\.json:2: ", read_bench)
 
-    def test_switches_are_the_columns_of_the_programs_list(self):
-        (self.results / "switches.txt").write_text(
-            "switch     paper  released  takes            methods  effect\n"
-            "timelimit  paper  released  paper, released  all      bootstrap | terminal\n")
+    def test_switches_are_those_of_the_programs_list(self):
+        (self.results / "registry.json").write_text(REGISTRY)
         row, = read_switches(self.results)
-        self.assertEqual((row["switch"], row["takes"], row["effect"]),
-                         ("timelimit", "paper, released", "bootstrap | terminal"))
-        (self.results / "switches.txt").write_text("switch  old  new  takes  methods  effect\n")
-        self.refuses(r"switches\.txt:1: ", read_switches)
+        self.assertEqual((row["id"], row["released"], row["methods"], row["effect"]),
+                         ("timelimit", "released", ["ppo", "oc"], "bootstrap | terminal"))
+        for damaged in ('{"switches": [{"id": "timelimit"}]}', '{"switches"', "[]"):
+            (self.results / "registry.json").write_text(damaged)
+            self.refuses(r"registry\.json: .*list --json", read_switches)
 
     def test_interpretations_are_matrices_by_file(self):
         path = self.results / "interpret/paper/Hopper-v2/option2vec/seed-000.csv"

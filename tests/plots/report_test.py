@@ -19,7 +19,7 @@ from plots.samples import Curve, Sample, author_samples, our_samples
 from plots.statistics import Moments
 from plots.style import RESULTS, inline_svg, svg_of
 from plots.text import Picture, moments, slug, to_html
-from tree import ROOT, with_reference, write_flat, write_run
+from tree import REGISTRY, ROOT, with_reference, write_flat, write_run
 
 COUNTERS = {"physics_us": 80.5, "inference_us": 5, "learning_us": 20, "total_us": 105.5,
             "bound_us": 99, "bound_products_us": 12, "bound_adam_us": 6.5, "MFLOP": 2,
@@ -74,9 +74,7 @@ class ReportTest(unittest.TestCase):
         write_run(results, "Fish", "ppo", 0, [1], settings="hidden = 32", steps=10_000,
                   wanted=2_000_000, fidelity="released-hidden=32", experiment="ablation",
                   status="diverged")
-        (results / "switches.txt").write_text(
-            "switch     paper  released  takes            methods  effect\n"
-            "timelimit  paper  released  paper, released  all      bootstrap | terminal\n")
+        (results / "registry.json").write_text(REGISTRY)
         (results / "theory.csv").write_text(
             "name,gap,relation,tolerance,verdict,compared\nTheorem 3.3,1e-12,<,1e-9,PASS,both\n")
         cls.files = make(results)

@@ -9,6 +9,9 @@ from plots.records import PAIRS
 from option2vec_results.standard import settings_of
 
 ROOT = Path(__file__).parents[2]
+REGISTRY = json.dumps({"switches": [{
+    "id": "timelimit", "paper": "paper", "released": "released", "takes": "paper, released",
+    "methods": ["ppo", "oc"], "effect": "bootstrap | terminal"}]})
 
 
 def with_reference(results: Path) -> Path:
