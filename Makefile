@@ -136,9 +136,9 @@ format: deps  ## run clang-format on all sources
 	@find src tests bench -name '*.cc' -o -name '*.h' | xargs clang-format -i
 
 golden: deps  ## rewrite the golden files; review the difference
-	@$(COMPILE) --target test64_golden test_harness
+	@$(COMPILE) --target test64_golden test_report
 	@O2V_REWRITE_GOLDEN=1 build/$(PRESET)/tests/test64_golden
-	@O2V_REWRITE_GOLDEN=1 build/$(PRESET)/tests/test_harness --gtest_filter=ParamTable.IsTheOneOnRecord
+	@O2V_REWRITE_GOLDEN=1 build/$(PRESET)/tests/test_report --gtest_filter=ParamTable.IsTheOneOnRecord
 
 TORTURE ?=
 torture: deps  ## disturb runs with kills, full disks, limits, signals, races (TORTURE="--scale 0.1")

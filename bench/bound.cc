@@ -7,8 +7,8 @@
 #include <tuple>
 
 #include "base/check.h"
-#include "harness/param_table.h"
 #include "nn/product.h"
+#include "report/param_table.h"
 
 namespace o2v::bench {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/types.h"
-#include "harness/config.h"
+#include "run/config.h"
 
 namespace o2v::bench {
 

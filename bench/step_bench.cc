@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "bench/bound.h"
-#include "harness/config.h"
+#include "run/config.h"
 
 namespace o2v::bench {
 namespace {

@@ -11,14 +11,15 @@ find src -name '*.cc' -o -name '*.h' | sort | xargs awk '
     may["nn"] = may["dist"] = may["env"] = " base "
     may["rollout"] = " base nn dist env "
     may["algo"] = may["rollout"] "rollout "
-    may["harness"] = may["algo"] "algo embedded build_info.h "
+    may["run"] = may["algo"] "algo embedded build_info.h "
+    may["report"] = may["run"] "run "
     may["render"] = " base env "
-    may["cli"] = may["harness"] "harness render "
+    may["cli"] = may["report"] "report render "
     may["env"] = may["env"] "embedded "
     # Where third-party headers may appear; Eigen and the standard library may appear anywhere.
     home["mujoco"] = "^src/(env|render)/"
-    home["toml++"] = "^src/harness/config\\.cc$"
-    home["nlohmann"] = "^src/(harness/(manifest|checkpoint|record|interpret)|cli/list)\\.cc$"
+    home["toml++"] = "^src/run/config\\.cc$"
+    home["nlohmann"] = "^src/(run/(manifest|checkpoint|record)|report/interpret|cli/list)\\.cc$"
     home["CLI"] = "^src/cli/"
   }
   /^[ \t]*#[ \t]*include[ \t]*"/ {

@@ -1,4 +1,4 @@
-"""What the place of a record says of its configuration; src/harness/record.cc has the same rule."""
+"""What the place of a record says of its configuration; src/run/record.cc has the same rule."""
 
 import json
 import re

@@ -28,8 +28,8 @@ class AhpPpo final : public PpoMethod {
   LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) override;
 
  private:
-  void Act(const Mat& s, std::span<const char> init, Index row) override;
-  void Values(const Choices& x, Index row) override;
+  void Act(const Mat& s, std::span<const char> init, Index first) override;
+  void Values(const Choices& x, Index first) override;
 
   struct Cache {
     OptionNets::CallAndReturnCache options;
@@ -63,7 +63,7 @@ class AhpPpo final : public PpoMethod {
 
 AhpPpo::AhpPpo(const AlgorithmInput& in)
     : PpoMethod(in, in.hyper->Int("options", 1)), clip_(in.hyper->Real("ratio_clip")) {
-  nets_ = MakeOptionNets(in, OptionNets::CriticHead::kU, init_);
+  nets_ = MakeOptionNets(in, OptionNets::CriticHead::kU, initialiser_);
   RegisterNetworks(in, nets_.Params(), {nets_.UsedParams()}, &nets_.policy, &nets_.critic);
   rollout_.batch.stop.assign(std::size_t(rollout_.batch.Size()), 0);
   o_prev_.assign(std::size_t(N_), 0);
@@ -110,7 +110,7 @@ void AhpPpo::AugmentedBackward(const Batch& batch, std::span<const int> x, const
   nets_.master.Backward(batch.s, c.master);
 }
 
-void AhpPpo::Act(const Mat& s, std::span<const char> init, Index row) {
+void AhpPpo::Act(const Mat& s, std::span<const char> init, Index first) {
   Batch& batch = rollout_.batch;
   Cache& c = caches_(N_);
   c.o.resize(std::size_t(N_));
@@ -126,16 +126,16 @@ void AhpPpo::Act(const Mat& s, std::span<const char> init, Index row) {
   SampleAction(nets_.policy, s, c.o, policy_rng_, a_, c.action);
   AddLogAugmented(c.stop, c.o, o_prev_, init, c.options, c.action.logp);
   LogDensity(switches_.density_log_eps, c.action.logp, c.action.slope);
-  batch.action.logp_old.segment(row, N_) = c.action.logp;
-  std::copy(c.stop.begin(), c.stop.end(), batch.stop.begin() + row);
-  RecordOptions(row, c.o, init, batch);
+  batch.action.logp_old.segment(first, N_) = c.action.logp;
+  std::copy(c.stop.begin(), c.stop.end(), batch.stop.begin() + first);
+  RecordOptions(first, c.o, init, batch);
 }
 
 /// v = u_{o'}.
-void AhpPpo::Values(const Choices& x, Index row) {
+void AhpPpo::Values(const Choices& x, Index first) {
   Cache& c = caches_(x.s.cols());
   Entries(x.o_prev, x.init, c.entry);
-  EntryValues(nets_.critic, x.s, c.entry, c.value.critic, rollout_.critics[0].v.data() + row);
+  EntryValues(nets_.critic, x.s, c.entry, c.value.critic, rollout_.critics[0].v.data() + first);
 }
 
 LossTerms AhpPpo::Loss(int, const Batch& batch, const FixedDraws*) {

@@ -42,9 +42,9 @@ struct LossTerms {
   double clip_fraction = 0;  // share of samples with a ratio outside [1-c, 1+c]
 };
 
-/// A statistic of an update, as what it is made of: a sum over n minibatches, steps or executions
-/// of an option. Those of several updates are added up, each part for itself. Where n is 0 (no
-/// execution began) the value is the sum.
+/// A statistic of an update: a sum over n minibatches, steps or executions of an option. To combine
+/// updates, add the sums and the counts separately. Where n is 0 (no execution began) the value is
+/// the sum.
 struct SumAndCount {
   double sum = 0, n = 0;
   double Value() const { return sum / std::max(1.0, n); }

@@ -62,19 +62,19 @@ DacOneStep::DacOneStep(const AlgorithmInput& in) : DoubleActorCritic(in) {
   const Activation g = ReadActivation(*in.hyper);
   const std::string name = NumericIndex() ? "master" : "policy";
   const Index n_in = in.S + (NumericIndex() ? 1 : K_);
-  policy_net_ = Mlp(name + ".body", name + ".head", n_in, h, K_, g, init_);
+  policy_net_ = Mlp(name + ".body", name + ".head", n_in, h, K_, g, initialiser_);
   if (NumericIndex()) norm_ = LayerNorm(name + ".ln", n_in);
   if (Swapped()) {
     y0_ = Linear("ynet.0", in.S, h_y);
     y1_ = Linear("ynet.1", h_y, K_);
-    init_.XavierUniform(y0_.W.value);
-    init_.XavierUniform(y1_.W.value);
+    initialiser_.XavierUniform(y0_.W.value);
+    initialiser_.XavierUniform(y1_.W.value);
   }
-  critic_net_ = Mlp("critic.body", "critic.q", in.S, h, K_, g, init_);
-  policies_ = IntraOptionPolicies(K_, in.S, in.A, h, g, init_);
+  critic_net_ = Mlp("critic.body", "critic.q", in.S, h, K_, g, initialiser_);
+  policies_ = IntraOptionPolicies(K_, in.S, in.A, h, g, initialiser_);
   if (NumericIndex() && Swapped() && Unnormalised()) {
     unused_head_.emplace_back("critic.u", h, K_ + 1);
-    unused_beta_ = PerOptionMlps("beta", K_, in.S, h, 1, g, init_);
+    unused_beta_ = PerOptionMlps("beta", K_, in.S, h, 1, g, initialiser_);
   }
   std::vector<Param*> option_policy = policy_net_.Params();
   if (NumericIndex()) Append(option_policy, norm_.Params());

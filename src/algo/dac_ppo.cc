@@ -1,4 +1,5 @@
 #include "algo/double_actor_critic.h"
+#include "algo/option_policy.h"
 
 namespace o2v {
 namespace {
@@ -8,12 +9,13 @@ namespace {
 ///
 ///   pi_hat(o | s, o') = (1 - beta_{o'}(s)) delta_{o o'} + beta_{o'}(s) pi(o | s),
 ///
-/// pi itself at first states; all else is the double actor-critic. Source: spec 2.3, 4.6; Zhang &
-/// Whiteson 2019.
+/// pi itself at first states; all else is the double actor-critic: acting is in two_stage.cc, the
+/// losses are in double_actor_critic.cc, the training step is in ppo_method.cc. Source: spec 2.3,
+/// 4.6; Zhang & Whiteson 2019.
 class DacPpo final : public DoubleActorCritic {
  public:
   explicit DacPpo(const AlgorithmInput& in) : DoubleActorCritic(in) {
-    nets_ = MakeOptionNets(in, OptionNets::CriticHead::kQ, init_);
+    nets_ = MakeOptionNets(in, OptionNets::CriticHead::kQ, initialiser_);
     std::vector<Param*> option_policy = nets_.master.Params();
     Append(option_policy, nets_.beta.Params());
     RegisterStages(in, nets_.Params(), option_policy, &nets_.policy, &nets_.critic);
@@ -24,21 +26,21 @@ class DacPpo final : public DoubleActorCritic {
                      When when, Mat& p) override {
     OptionNets::CallAndReturnCache& c = caches_(s.cols());
     nets_.Master(s, c);
-    nets_.CallAndReturn(s, o_prev, init, c.pi, switches_.beta_index, c);
+    nets_.BetaAndMask(s, o_prev, switches_.beta_index, c);
     if (when == When::kUpdate && switches_.dac_update_mask == Fidelity::kReleased) {
-      // Every o' of the minibatch is marked in its first sample, none in the others; spec 4.6 (g)
+      // As in the authors' code: the first sample is marked with every o' of the minibatch, the
+      // other samples with none; spec 4.6 (g).
       c.M.col(0) = c.M.rowwise().maxCoeff();
       c.M.rightCols(c.M.cols() - 1).setZero();
-      CallAndReturn(c.pi, c.beta.beta, c.M, o_prev, init, switches_.beta_index, c.pi_hat);
     }
-    p = c.pi_hat;
+    MixCallAndReturn(c.pi, c.beta.beta, c.M, o_prev, init, switches_.beta_index, p);
   }
 
   void OptionBackward(const ConstMatRef& s, std::span<const int> o_prev, std::span<const char> init,
                       const Mat& dp) override {
     OptionNets::CallAndReturnCache& c = caches_(s.cols());
-    CallAndReturnBackward(dp, c.pi, c.beta.beta, c.M, o_prev, init, switches_.beta_index,
-                          c.master.dout, c.beta.db);
+    MixCallAndReturnBackward(dp, c.pi, c.beta.beta, c.M, o_prev, init, switches_.beta_index,
+                             c.master.dout, c.beta.db);
     nets_.master.Backward(s, c.master);
     nets_.BackwardBeta(s, o_prev, c.beta);
   }

@@ -51,14 +51,15 @@ LossTerms DoubleActorCritic::OptionLoss(const Batch& batch, const FixedDraws*) {
   OptionForward(batch.s, batch.o_prev, batch.init, When::kUpdate, c.p);
   critic_->Forward(batch.s, critic);
   option_log_.Log(c.p, c.log_p);
-  PickRows(c.log_p, batch.o, c.logp);
-  ClippedSurrogate(c.logp, batch.option.logp_old, batch.option.adv_hat, clip_, terms, c.dlogp);
+  PickEntries(c.log_p, batch.o, c.logp_taken);
+  ClippedSurrogate(c.logp_taken, batch.option.logp_old, batch.option.adv_hat, clip_, terms,
+                   c.dlogp_taken);
   terms.entropy = MeanEntropy(c.p, c.log_p);
   c.value.v = batch.P_old.cwiseProduct(critic.out).colwise().sum().transpose();
   ValueLoss(c.value.v, batch.option.ret, terms, c.value.dv);
   terms.total = terms.surrogate - w_ * terms.entropy + terms.value;
 
-  option_log_.Backward(c.p, batch.o, c.dlogp, -w_, c.dp);
+  option_log_.Backward(c.p, batch.o, c.dlogp_taken, -w_, c.dp);
   OptionBackward(batch.s, batch.o_prev, batch.init, c.dp);
   critic.dout = batch.P_old * c.value.dv.asDiagonal();
   critic_->Backward(batch.s, critic);

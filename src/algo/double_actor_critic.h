@@ -1,5 +1,5 @@
 #pragma once
-// The networks and losses of DAC: one network an option, and an option policy of any form.
+// The networks and losses of DAC: one network per option, and an option policy of any form.
 
 #include "algo/option_policy.h"
 #include "algo/two_stage.h"
@@ -40,9 +40,9 @@ class DoubleActorCritic : public TwoStageMethod {
   /// What a batch of B samples leaves behind.
   struct Cache {
     ActionCache action;
-    ValueCache value;  // value.critic.out is q (K, B)
-    Mat p, log_p, dp;  // (K, B)
-    Vec logp, dlogp;   // (B) ln p_o
+    ValueCache value;             // value.critic.out is q (K, B)
+    Mat p, log_p, dp;             // (K, B)
+    Vec logp_taken, dlogp_taken;  // (B) ln p_o
   };
 
   OptionDistribution Options(const ConstMatRef& s, std::span<const int> o_prev,

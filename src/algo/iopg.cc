@@ -12,13 +12,13 @@ namespace {
 /// IOPG: policy gradient with the options inferred from the history. With p_t[i] = pi_i(a_t | s_t)
 /// and P_t[i, j] the probability that option j follows i at s_t (call-and-return),
 ///
-///   m_1 = pi(. | s_1),  c_t = sum_i m_t[i] p_t[i],  w_t[i] = m_t[i] p_t[i] / c_t,
+///   m_0 = pi(. | s_0),  c_t = sum_i m_t[i] p_t[i],  w_t[i] = m_t[i] p_t[i] / c_t,
 ///   m_{t+1}[j] = sum_i w_t[i] P_{t+1}[i, j]
 ///   L = -(1/L_ep) sum_t A_t ln c_t + (1/L_ep) sum_t 1/2 (R_t - v_t)^2,  A = R - v constant,
 ///
 /// c_t is the probability of a_t given the history; its gradient runs through all earlier m. Each
 /// worker acts with a copy of the networks; when its episode ends, the gradient of its copy moves
-/// the master copy, which it then takes over. v is the first entry of q.
+/// the master copy, whose weights it then copies. v is the first entry of q.
 ///
 /// Switches: `iopg_init_flag` = released takes every step for a first one, so that m_t = pi(s_t)
 /// and no termination matters; `iopg_posterior` = released weighs m_t with p_t in place of p_{t-1}.
@@ -69,8 +69,8 @@ class Iopg final : public Method {
     MatD dlog_p, dz, db;   // (K, n) adjoints of ln p_t and of the logits of pi and beta
     VecD dv;               // (n)
     VecD dm, dweights;     // (K) adjoints of m_t and of the weights that pass through P_t
-    VecD dw;               // (K) adjoint that the step after leaves: of w_t, or with released
-                           // `iopg_posterior` of m_t
+    VecD dlater;           // (K) what the steps after t leave: the adjoint of w_t, or with released
+                           // `iopg_posterior` that of m_t
     void Resize(Index K, Index n);
   };
 
@@ -81,6 +81,9 @@ class Iopg final : public Method {
   /// Loss and gradients of `nets` on an episode of n steps.
   LossTerms EpisodeLoss(OptionNets& nets, const ConstMatRef& s, const ConstMatRef& a,
                         std::span<const double> r, std::span<const int> init);
+  void AskNetworks(const OptionNets& nets, const ConstMatRef& s, const ConstMatRef& a);
+  LossTerms Terms(std::span<const double> r);
+  void BackwardNetworks(OptionNets& nets, Index n);
   void Forward(std::span<const int> init, Index n);
   void Backward(std::span<const int> init, Index n);
   void ForwardReleased(std::span<const int> init, Index n);
@@ -95,6 +98,7 @@ class Iopg final : public Method {
 
   std::vector<int> finished_;  // workers whose episodes ended in the last step
   CacheByWidth<OptionNets::CallAndReturnCache> options_;
+  QueryCache acting_;  // of one worker's state
   // As many as the longest episode so far has needed: what the time limit allows would be tens of
   // megabytes. A longer episode adds to them, once, and nothing else on the training path allocates
   // after the first update.
@@ -112,7 +116,7 @@ Iopg::Iopg(const AlgorithmInput& in)
       workers_(std::size_t(in.workers)),
       a_(in.A, in.workers),
       o_one_(1) {
-  const auto make = [&] { return MakeOptionNets(in, OptionNets::CriticHead::kQ, init_); };
+  const auto make = [&] { return MakeOptionNets(in, OptionNets::CriticHead::kQ, initialiser_); };
   nets_ = make();
   // Two time limits: at a change of task the running episode goes on into the new one (spec 4.5).
   const Index room = 2 * Index(in.time_limit);
@@ -126,6 +130,7 @@ Iopg::Iopg(const AlgorithmInput& in)
   }
   RegisterNetworks(in, nets_.Params(), {nets_.UsedParams()}, &nets_.policy, &nets_.critic);
   finished_.reserve(workers_.size());
+  nets_.critic.Forward(Mat::Zero(in.S, 1), acting_.critic);  // sized: a time limit may come late
   history_.Resize(K_, room);
   init_given_.reserve(std::size_t(room));
 }
@@ -167,7 +172,7 @@ const Mat& Iopg::Options(OptionNets& nets, const ConstMatRef& s, std::span<const
 
 void Iopg::Collect(VecEnv& env, std::vector<Episode>& episodes) {
   finished_.clear();
-  QueryCache& c = query_caches_(1);
+  QueryCache& c = acting_;
   while (finished_.empty()) {
     for (std::size_t i = 0; i < workers_.size(); ++i) {
       Worker& worker = workers_[i];
@@ -209,7 +214,7 @@ const std::vector<SumAndCount>& Iopg::Update() {
         EpisodeLoss(worker.nets, worker.s.leftCols(n), worker.a.leftCols(n),
                     {worker.r.data(), std::size_t(n)}, {worker.init.data(), std::size_t(n)});
     for (std::size_t j = 0; j < params_.size(); ++j) {
-      params_[j]->grad.swap(worker.params[j]->grad);  // the master's is zero after a step
+      params_[j]->grad.swap(worker.params[j]->grad);  // and gives the worker the master's zeros
     }
     StepOn(0, terms);
   }
@@ -225,10 +230,58 @@ const std::vector<SumAndCount>& Iopg::Update() {
 // ---- Loss ---------------------------------------------------------------------------------------
 
 void Iopg::History::Resize(Index K, Index n) {
-  for (VecD* x : {&dm, &dweights, &dw}) x->resize(K);
+  for (VecD* x : {&dm, &dweights, &dlater}) x->resize(K);
   if (v.size() >= n) return;
   for (MatD* x : {&log_p, &pi, &beta, &m, &w, &dlog_p, &dz, &db}) x->resize(K, n);
   for (VecD* x : {&v, &R, &log_c, &dv}) x->resize(n);
+}
+
+LossTerms Iopg::EpisodeLoss(OptionNets& nets, const ConstMatRef& s, const ConstMatRef& a,
+                            std::span<const double> r, std::span<const int> init) {
+  const Index n = s.cols();
+  history_.Resize(K_, n);
+  init_given_.assign(init.begin(), init.end());
+  init_given_[0] = 1;  // also where `switch_init_flag` = released joins the steps of two tasks
+  if (AlwaysInitial()) std::fill(init_given_.begin(), init_given_.end(), 1);
+  const bool paper = switches_.iopg_posterior == Fidelity::kPaper;
+
+  AskNetworks(nets, s, a);
+  paper ? Forward(init_given_, n) : ForwardReleased(init_given_, n);
+  const LossTerms terms = Terms(r);
+  paper ? Backward(init_given_, n) : BackwardReleased(init_given_, n);
+  BackwardNetworks(nets, n);
+  return terms;
+}
+
+/// ln p_t, pi, beta and v of every step, block by block.
+void Iopg::AskNetworks(const OptionNets& nets, const ConstMatRef& s, const ConstMatRef& a) {
+  History& h = history_;
+  const Index n = s.cols();
+  for (Index start = 0, i = 0; start < n; start += kBlock, ++i) {
+    if (i == Index(blocks_.size())) blocks_.push_back(std::make_unique<Block>());
+    Block& block = *blocks_[std::size_t(i)];
+    const Index m = std::min(kBlock, n - start);
+    block.s.setZero(s.rows(), kBlock);
+    block.s.leftCols(m) = s.middleCols(start, m);
+    block.a.setZero(a.rows(), K_ * kBlock);
+    for (Index k = 0; k < K_; ++k) {
+      block.a.middleCols(k * kBlock, m) = a.middleCols(start, m);
+    }
+    nets.Master(block.s, block.options);
+    nets.critic.Forward(block.s, block.critic);
+    nets.policy.ForwardAll(block.s, block.policy);
+    GaussianLogProb(block.a, block.policy.nets.out, block.policy.sigma, block.logp);
+    const Eigen::Map<const Mat> logp(block.logp.data(), kBlock, K_);
+    h.log_p.middleCols(start, m) = logp.topRows(m).transpose().cast<double>();
+    h.pi.middleCols(start, m) = block.options.pi.leftCols(m).cast<double>();
+    if (AlwaysInitial()) {
+      h.beta.middleCols(start, m).setOnes();
+    } else {
+      nets.Beta(block.s, {}, true, block.options.beta);
+      h.beta.middleCols(start, m) = block.options.beta.beta.leftCols(m).cast<double>();
+    }
+    h.v.segment(start, m) = block.critic.out.row(0).head(m).transpose().cast<double>();
+  }
 }
 
 /// m_t, from the weights of the options before that pass through P_t, and ln c_t.
@@ -241,7 +294,7 @@ void Iopg::Pass(const Eigen::Ref<const VecD>& weights, bool init, Index t) {
   } else if (switches_.beta_index == Fidelity::kPaper) {
     m = (1 - beta) * weights.array() + (beta * weights.array()).sum() * pi;
   } else {
-    m = (1 - beta) * weights.array() + beta * pi;
+    m = (1 - beta) * weights.array() + beta * pi;  // the weights sum to 1
   }
   const double top = (m.log() + log_p).maxCoeff();
   h.log_c(t) = top + std::log((m.log() + log_p - top).exp().sum());
@@ -286,17 +339,18 @@ void Iopg::Forward(std::span<const int> init, Index n) {
   }
 }
 
-/// Adjoints of ln p and of the logits, from the last step to the first; spec 4.5 (e). dw: of w_t.
+/// Adjoints of ln p and of the logits, from the last step to the first; spec 4.5 (e). dlater: of
+/// w_t.
 void Iopg::Backward(std::span<const int> init, Index n) {
   History& h = history_;
-  h.dw.setZero();
+  h.dlater.setZero();
   for (Index t = n - 1; t >= 0; --t) {
     const auto p_over_c = (h.log_p.col(t).array() - h.log_c(t)).exp();
-    const double mean = h.dw.dot(h.w.col(t));
-    h.dm = (Kappa(n, t) + h.dw.array() - mean) * p_over_c;
+    const double mean = h.dlater.dot(h.w.col(t));
+    h.dm = (Kappa(n, t) + h.dlater.array() - mean) * p_over_c;
     h.dlog_p.col(t) = h.m.col(t).array() * h.dm.array();
     PassBackward(h.w.col(std::max<Index>(t - 1, 0)), init[std::size_t(t)], t);
-    h.dw = h.dweights;
+    h.dlater = h.dweights;
   }
 }
 
@@ -317,64 +371,29 @@ void Iopg::ForwardReleased(std::span<const int> init, Index n) {
   }
 }
 
-/// Its backward. dw: of m_t.
+/// Its backward. dlater: of m_t.
 void Iopg::BackwardReleased(std::span<const int> init, Index n) {
   History& h = history_;
-  h.dw.setZero();
+  h.dlater.setZero();
   for (Index t = n - 1; t >= 0; --t) {
     const auto p_over_c = (h.log_p.col(t).array() - h.log_c(t)).exp();
     const double kappa = Kappa(n, t);
-    h.dm = kappa * p_over_c + h.dw.array();
+    h.dm = kappa * p_over_c + h.dlater.array();
     h.dlog_p.col(t) = kappa * h.m.col(t).array() * p_over_c;
     PassBackward(h.w.col(t), init[std::size_t(t)], t);
     // w_t = softmax(ln m_{t-1} + ln p_t).
     const auto w = h.w.col(t).array();
     const double mean = (w * h.dweights.array()).sum();
     h.dlog_p.col(t).array() += w * (h.dweights.array() - mean);
-    if (t > 0) h.dw = w * (h.dweights.array() - mean) / h.m.col(t - 1).array();
+    if (t > 0) h.dlater = w * (h.dweights.array() - mean) / h.m.col(t - 1).array();  // m > 0
   }
 }
 
-LossTerms Iopg::EpisodeLoss(OptionNets& nets, const ConstMatRef& s, const ConstMatRef& a,
-                            std::span<const double> r, std::span<const int> init) {
+/// R, the terms of the loss and dv, from ln c and v.
+LossTerms Iopg::Terms(std::span<const double> r) {
   LossTerms terms;
-  const Index n = s.cols(), A = a.rows();
   History& h = history_;
-  h.Resize(K_, n);
-  init_given_.assign(init.begin(), init.end());
-  init_given_[0] = 1;
-  if (AlwaysInitial()) std::fill(init_given_.begin(), init_given_.end(), 1);
-  const bool betas = !AlwaysInitial();
-
-  // Everything that the networks say.
-  for (Index start = 0, i = 0; start < n; start += kBlock, ++i) {
-    if (i == Index(blocks_.size())) blocks_.push_back(std::make_unique<Block>());
-    Block& block = *blocks_[std::size_t(i)];
-    const Index m = std::min(kBlock, n - start);
-    block.s.setZero(s.rows(), kBlock);
-    block.s.leftCols(m) = s.middleCols(start, m);
-    block.a.setZero(A, K_ * kBlock);
-    for (Index k = 0; k < K_; ++k) {
-      block.a.middleCols(k * kBlock, m) = a.middleCols(start, m);
-    }
-    nets.Master(block.s, block.options);
-    nets.critic.Forward(block.s, block.critic);
-    nets.policy.ForwardAll(block.s, block.policy);
-    GaussianLogProb(block.a, block.policy.nets.out, block.policy.sigma, block.logp);
-    if (betas) nets.Beta(block.s, {}, true, block.options.beta);
-    const Eigen::Map<const Mat> logp(block.logp.data(), kBlock, K_);
-    h.log_p.middleCols(start, m) = logp.topRows(m).transpose().cast<double>();
-    h.pi.middleCols(start, m) = block.options.pi.leftCols(m).cast<double>();
-    if (betas) {
-      h.beta.middleCols(start, m) = block.options.beta.beta.leftCols(m).cast<double>();
-    } else {
-      h.beta.middleCols(start, m).setOnes();
-    }
-    h.v.segment(start, m) = block.critic.out.row(0).head(m).transpose().cast<double>();
-  }
-
-  const bool paper = switches_.iopg_posterior == Fidelity::kPaper;
-  paper ? Forward(init_given_, n) : ForwardReleased(init_given_, n);
+  const Index n = Index(r.size());
   double R = 0;
   for (Index t = n - 1; t >= 0; --t) {
     R = r[std::size_t(t)] + gamma_ * R;
@@ -387,10 +406,14 @@ LossTerms Iopg::EpisodeLoss(OptionNets& nets, const ConstMatRef& s, const ConstM
     terms.value += 0.5 * A_t * A_t / double(n);
     h.dv(t) = -A_t / double(n);
   }
-  paper ? Backward(init_given_, n) : BackwardReleased(init_given_, n);
   terms.entropy = GaussianMeanEntropy(blocks_[0]->policy.sigma_of);
   terms.total = terms.surrogate + terms.value;
+  return terms;
+}
 
+/// The adjoints of ln p, of the logits and of v through the networks, block by block.
+void Iopg::BackwardNetworks(OptionNets& nets, Index n) {
+  const History& h = history_;
   for (Index start = 0, i = 0; start < n; start += kBlock, ++i) {
     Block& block = *blocks_[std::size_t(i)];
     const Index m = std::min(kBlock, n - start);
@@ -406,12 +429,11 @@ LossTerms Iopg::EpisodeLoss(OptionNets& nets, const ConstMatRef& s, const ConstM
     block.critic.dout.setZero(K_, kBlock);
     block.critic.dout.row(0).head(m) = h.dv.segment(start, m).transpose().cast<Real>();
     nets.critic.Backward(block.s, block.critic);
-    if (!betas) continue;
+    if (AlwaysInitial()) continue;  // no termination matters
     block.options.beta.db.setZero(K_, kBlock);
     block.options.beta.db.leftCols(m) = h.db.middleCols(start, m).cast<Real>();
     nets.BackwardBeta(block.s, {}, block.options.beta);
   }
-  return terms;
 }
 
 LossTerms Iopg::Loss(int, const Batch& batch, const FixedDraws*) {

@@ -19,7 +19,7 @@ void ClippedSurrogate(const Vec& logp, const Vec& logp_old, const Vec& adv_hat, 
 /// 1/2 mean (v - ret)^2 -> terms.value and dv (B) = (v - ret) / B.
 void ValueLoss(const Vec& v, const Vec& ret, LossTerms& terms, Vec& dv);
 
-// ---- With one network an option -----------------------------------------------------------------
+// ---- With one network per option ----------------------------------------------------------------
 
 /// What acting by options o, or a loss on it, leaves behind.
 struct ActionCache {

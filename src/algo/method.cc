@@ -2,17 +2,19 @@
 
 #include <algorithm>
 
+#include "base/check.h"
+
 namespace o2v {
 
 // ---- Statistics ---------------------------------------------------------------------------------
 
-void Method::RecordOptions(Index column, std::span<const int> o, std::span<const char> init,
+void Method::RecordOptions(Index first, std::span<const int> o, std::span<const char> init,
                            Batch& rollout) {
   for (std::size_t i = 0; i < o.size(); ++i) {
-    const std::size_t row = std::size_t(column) + i;
-    rollout.o[row] = o[i];
-    rollout.o_prev[row] = o_prev_[i];
-    rollout.init[row] = init[i];
+    const std::size_t b = std::size_t(first) + i;
+    rollout.o[b] = o[i];
+    rollout.o_prev[b] = o_prev_[i];
+    rollout.init[b] = init[i];
     usage_.Count(o[i], o_prev_[i], init[i]);
     o_prev_[i] = o[i];
   }
@@ -45,7 +47,7 @@ Method::Method(const AlgorithmInput& in, Index K, std::vector<std::string> stage
       switches_(in.switches),
       K_(K),
       N_(in.workers),
-      init_(in.draw_weights ? Initialiser(init_rng_) : Initialiser()),
+      initialiser_(in.draw_weights ? Initialiser(init_rng_) : Initialiser()),
       usage_(K),
       stages_(std::move(stages)),
       more_(more),
@@ -85,7 +87,9 @@ double Method::Step(int stage) {
 }
 
 Activation ReadActivation(const Settings& settings) {
-  return settings.Int("activation") == 0 ? Activation::kTanh : Activation::kRelu;
+  const int g = settings.Int("activation");
+  Check(g <= 1, "activation: ", g, " is neither 0 (tanh) nor 1 (relu)");
+  return g == 0 ? Activation::kTanh : Activation::kRelu;
 }
 
 OptionNets MakeOptionNets(const AlgorithmInput& in, OptionNets::CriticHead head,

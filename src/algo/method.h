@@ -34,10 +34,11 @@ class CacheByWidth {
   std::map<Index, std::unique_ptr<Cache>> caches_;
 };
 
-/// The thin base of the methods: optimiser, random streams, statistics, saved state, and what most
+/// The base of the methods: optimiser, random streams, statistics, saved state, and what most
 /// networks are asked alike. How a method acts (Collect, OptionPolicy) and what it learns (Loss,
 /// Update) is in its own file.
 class Method : public Algorithm {
+  // First, as members below draw from them while they are made.
   const std::uint64_t seed_;
   Rng init_rng_;                                     // not part of the state
   std::deque<std::pair<std::string, Rng>> streams_;  // which stay where they are
@@ -72,32 +73,35 @@ class Method : public Algorithm {
   Rng& NewStream(const std::string& name);
   /// Closes construction, when the method's networks exist: pointers to them are kept.
   /// all: every parameter in the order of the network; stages: those that each stage's loss
-  /// reaches. A method that answers the queries itself has neither policy nor critic.
+  /// reaches. policy, critic: null where the method answers ActionPolicy, OptionValues itself.
   void RegisterNetworks(const AlgorithmInput& in, std::vector<Param*> all,
                         std::initializer_list<std::vector<Param*>> stages,
                         IntraOptionPolicies* policy, Mlp* critic);
 
-  /// A step of the optimiser on the gradients of a loss with these terms.
-  void StepOn(int stage, const LossTerms& terms) { means_[stage].Add(terms, Step(stage)); }
-  /// Loss and step on a batch. Where an option is all but never chosen, or a termination saturates,
-  /// gradients are subnormal numbers; weights cannot tell them from zero.
+  /// A step of the optimiser on the gradients of a loss with these terms, which are reported.
+  void StepOn(int stage, const LossTerms& terms) {
+    const double norm = Step(stage);
+    means_[stage].Add(terms, norm);
+  }
+  /// Loss and step on a batch. Where an option is almost never chosen, or a termination saturates,
+  /// gradients are subnormal numbers: slow, and too small to move a weight.
   void Learn(int stage, const Batch& batch) {
     const FlushSubnormals flush;
     StepOn(stage, Loss(stage, batch, nullptr));
   }
   /// Parameter i, whose gradient must be zero from now on, is never stepped again.
   void Hold(std::size_t i) { adam_->Freeze(i); }
-  /// Options o of a step of all workers into `rollout` at `column`, with o_prev_ and the flags;
-  /// they are counted and become o_prev_.
-  void RecordOptions(Index column, std::span<const int> o, std::span<const char> init,
+  /// Options o of a step of all workers into `rollout`, from sample `first` on, with o_prev_ and
+  /// the flags; they are counted and become o_prev_.
+  void RecordOptions(Index first, std::span<const int> o, std::span<const char> init,
                      Batch& rollout);
   /// The numbers of StatNames() of all steps since the last call.
   const std::vector<SumAndCount>& Report();
 
   const Switches switches_;
   const Index K_;
-  const int N_;             // workers
-  const Initialiser init_;  // of the networks; for constructors
+  const int N_;                    // workers
+  const Initialiser initialiser_;  // of the networks; for constructors
   std::vector<Param*> params_;
   std::vector<std::vector<char>> in_graph_;  // of each stage
   std::vector<int> o_prev_;                  // (N), empty where a method keeps them elsewhere
@@ -115,10 +119,10 @@ class Method : public Algorithm {
   std::vector<SumAndCount> statistics_;  // of the last Report
 };
 
-/// `activation` of a method's numbers, tanh or relu.
+/// The hyper-parameter `activation`, tanh or relu.
 Activation ReadActivation(const Settings& settings);
 
-/// The network of spec 2.3 in the sizes of a method's numbers.
+/// The network of spec 2.3 in the sizes that the hyper-parameters say.
 OptionNets MakeOptionNets(const AlgorithmInput& in, OptionNets::CriticHead head,
                           const Initialiser& init);
 

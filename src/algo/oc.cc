@@ -73,7 +73,7 @@ OptionCritic::OptionCritic(const AlgorithmInput& in)
       eta_(Real(in.hyper->Real("termination_penalty"))),
       epsilon_(Real(in.hyper->Real("epsilon_greedy"))),
       target_every_(in.hyper->Int("target_every", 1)) {
-  nets_ = MakeOptionNets(in, OptionNets::CriticHead::kQ, init_);
+  nets_ = MakeOptionNets(in, OptionNets::CriticHead::kQ, initialiser_);
   target_ = nets_;
   target_params_ = target_.Params();
   std::vector<Param*> used = nets_.critic.Params();  // no master policy
@@ -135,24 +135,24 @@ void OptionCritic::Collect(VecEnv& env, std::vector<Episode>& episodes) {
   IntraOptionPolicies::Cache& policy = c.action.policy;
   c.o.resize(std::size_t(N_));
   for (int t = 0; t < T_; ++t) {
-    const Index column = Index(t) * N_;
+    const Index first = Index(t) * N_;
     const Mat& s = env.States();
     SampleCategorical(Options(s, o_prev_, env.EpisodeStarts()), policy_rng_, c.o);
     nets_.policy.ForwardOne(s, c.o, policy);
     SampleGaussian(policy.nets.out, policy.sigma, policy_rng_, a_);
-    rollout_.s.middleCols(column, N_) = s;
-    rollout_.a.middleCols(column, N_) = a_;
-    RecordOptions(column, c.o, env.EpisodeStarts(), rollout_);
+    rollout_.s.middleCols(first, N_) = s;
+    rollout_.a.middleCols(first, N_) = a_;
+    RecordOptions(first, c.o, env.EpisodeStarts(), rollout_);
 
     env.Step(a_, transition_, episodes);
-    rollout_.r.segment(column, N_) = transition_.r;
+    rollout_.r.segment(first, N_) = transition_.r;
     if (RecordEnds(transition_, t, mask_) && switches_.timelimit == Fidelity::kPaper) {
       TargetValue(transition_.s_last, o_prev_, c);
       for (int i = 0; i < N_; ++i) {
-        if (transition_.TimeLimit(std::size_t(i))) rollout_.r(column + i) += gamma_ * c.end(i);
+        if (transition_.TimeLimit(std::size_t(i))) rollout_.r(first + i) += gamma_ * c.end(i);
       }
     }
-    rollout_.mask.segment(column, N_) = mask_.col(t);
+    rollout_.mask.segment(first, N_) = mask_.col(t);
     if (env.TotalSteps() / N_ % target_every_ == 0) CopyToTarget();
   }
   rollout_.s_end = env.States();

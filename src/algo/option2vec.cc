@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <optional>
+
 #include "algo/option2vec_nets.h"
 #include "algo/two_stage.h"
 #include "base/check.h"
@@ -29,7 +32,7 @@ class Option2Vec final : public TwoStageMethod {
  public:
   explicit Option2Vec(const AlgorithmInput& in);
 
-  void ChangeTask() override { Freeze(); }
+  void ChangeTask() override { StartFreeze(); }
   void Serialize(StateVisitor& v) override;
   void OptionPolicy(const Mat& s, const std::vector<int>& o_prev, const std::vector<char>& init,
                     Mat& P) override;
@@ -49,7 +52,7 @@ class Option2Vec final : public TwoStageMethod {
   };
 
   /// From now on `o2v_freeze` acts.
-  void Freeze();
+  void StartFreeze();
   OptionDistribution Options(const ConstMatRef& s, std::span<const int> o_prev,
                              std::span<const char> init) override;
   void DrawActions(const ConstMatRef& s, std::span<const int> o, Mat& a, Vec& logp) override;
@@ -58,6 +61,10 @@ class Option2Vec final : public TwoStageMethod {
   void AfterRollout() override;
   /// Masks for a pass over B samples: drawn, or taken from `fixed`; null without dropout.
   const AttentionBlock::Masks* Dropout(Index B, const FixedDraws* fixed, Cache& c);
+  /// `o2v_option_in_update` = released: the update does not use the option that acted.
+  bool Redraws() const { return !Paper(switches_.o2v_option_in_update); }
+  /// Options drawn anew from c.options.P, or those of `fixed` -> c.o.
+  void Redraw(const FixedDraws* fixed, Cache& c);
   LossTerms OptionLoss(const Batch& batch, const FixedDraws* fixed) override;
   LossTerms ActionLoss(const Batch& batch, const FixedDraws* fixed) override;
 
@@ -72,10 +79,10 @@ class Option2Vec final : public TwoStageMethod {
   PolicyOverOptions options_;
   ActionPolicyNet action_;
   OptionValueNet critic_net_;
-  std::vector<LayerNorm> unused_;         // one or none: spec 2.6 item 9
-  std::vector<std::size_t> init_params_;  // positions of the initial net in Params()
-  bool frozen_ = false;                   // the task has changed, and o2v_freeze acts
-  PolicyOverOptions::Tables tables_;      // of the weights as they stood when they were made
+  std::optional<LayerNorm> unused_;        // spec 2.6 item 9
+  std::vector<std::size_t> start_params_;  // positions of the net of first states in Params()
+  bool frozen_ = false;                    // the task has changed, and o2v_freeze acts
+  PolicyOverOptions::Tables tables_;       // products of weights: see Tabulate
   Mat action_table_, critic_table_;
   CacheByWidth<Cache> caches_;
 };
@@ -102,25 +109,25 @@ Option2Vec::Option2Vec(const AlgorithmInput& in)
   const PolicyOverOptions::Form form{.two_tokens = !Paper(switches_.o2v_query),
                                      .init_relu = !Paper(switches_.o2v_init_relu),
                                      .prev_embed_grad = Paper(switches_.o2v_prev_embed_grad)};
-  options_ = PolicyOverOptions(sizes_, form, init_);
-  action_ = ActionPolicyNet(sizes_, init_);
-  critic_net_ = OptionValueNet(sizes_, scalar_critic_, init_);
+  options_ = PolicyOverOptions(sizes_, form, initialiser_);
+  action_ = ActionPolicyNet(sizes_, initialiser_);
+  critic_net_ = OptionValueNet(sizes_, scalar_critic_, initialiser_);
   // The authors' network allocates one more LayerNorm; it counts, and exists only when every switch
   // of the architecture is `released` (spec 2.7).
   if (!scalar_critic_ && form.two_tokens && form.init_relu) {
-    unused_.emplace_back("unused.ln", sizes_.S + sizes_.D);
+    unused_.emplace("unused.ln", sizes_.S + sizes_.D);
   }
 
   std::vector<Param*> params = options_.Params();
   Append(params, action_.Params());
   Append(params, critic_net_.Params());
-  for (LayerNorm& norm : unused_) Append(params, norm.Params());
+  if (unused_) Append(params, unused_->Params());
   std::vector<Param*> option_stage = options_.Params(), action_stage = action_.Params();
   Append(option_stage, critic_net_.Params());
   Append(action_stage, critic_net_.Params());
   RegisterNetworks(in, std::move(params), {option_stage, action_stage}, nullptr, nullptr);
   for (std::size_t i = 0; i < params_.size(); ++i) {
-    if (std::ranges::count(options_.InitParams(), params_[i]) > 0) init_params_.push_back(i);
+    if (std::ranges::count(options_.StartParams(), params_[i]) > 0) start_params_.push_back(i);
   }
 }
 
@@ -128,17 +135,25 @@ void Option2Vec::Serialize(StateVisitor& v) {
   Method::Serialize(v);
   int frozen = frozen_;
   v.Below("frozen", frozen, 2);
-  if (frozen && !frozen_) Freeze();
+  if (frozen && !frozen_) StartFreeze();
 }
 
-void Option2Vec::Freeze() {
-  if (switches_.o2v_freeze == o2v::Freeze::kNone) return;
+/// o2v_freeze  what leaves the option stage's graph  its gradient        what still moves it
+/// paper       W_o                                   zero                nothing: it is held
+/// released    W_o                                   zero                momentum, with `adam_idle`
+/// policy      the whole option policy               none is computed    momentum, with `adam_idle`
+/// none        nothing
+void Option2Vec::StartFreeze() {
+  if (switches_.o2v_freeze == Freeze::kNone) return;
   frozen_ = true;
-  const bool policy = switches_.o2v_freeze == o2v::Freeze::kPolicy;
-  for (std::size_t i = 0; i < options_.Params().size(); ++i) {  // the first of Params()
-    if (!policy && params_[i] != &options_.W_o) continue;
+  const bool policy = switches_.o2v_freeze == Freeze::kPolicy;
+  const std::vector<Param*> of_policy = options_.Params();
+  for (std::size_t i = 0; i < params_.size(); ++i) {
+    const bool leaves =
+        policy ? std::ranges::count(of_policy, params_[i]) > 0 : params_[i] == &options_.W_o;
+    if (!leaves) continue;
     in_graph_[kOption][i] = 0;
-    if (switches_.o2v_freeze == o2v::Freeze::kPaper) Hold(i);
+    if (switches_.o2v_freeze == Freeze::kPaper) Hold(i);
   }
 }
 
@@ -193,7 +208,7 @@ void Option2Vec::BeforeRollout() {
   critic_net_.Tabulate(options_.W_o.value, critic_table_);
 }
 
-/// By the switch the update is given done_t = init_{t+1} for init_t.
+/// With `o2v_init_flag` = released the losses see done_t in place of init_t.
 void Option2Vec::AfterRollout() {
   if (Paper(switches_.o2v_init_flag)) return;
   std::vector<char>& init = rollout_.batch.init;
@@ -201,6 +216,14 @@ void Option2Vec::AfterRollout() {
 }
 
 // ---- Losses -------------------------------------------------------------------------------------
+
+void Option2Vec::Redraw(const FixedDraws* fixed, Cache& c) {
+  if (fixed && !fixed->o.empty()) {
+    c.o = fixed->o;
+  } else {
+    SampleCategorical(c.options.P, redraw_rng_, c.o);
+  }
+}
 
 LossTerms Option2Vec::OptionLoss(const Batch& batch, const FixedDraws* fixed) {
   LossTerms terms;
@@ -213,13 +236,7 @@ LossTerms Option2Vec::OptionLoss(const Batch& batch, const FixedDraws* fixed) {
   const AttentionBlock::Masks* masks = Dropout(B, fixed, c);
   options_.Forward(batch.s, batch.o_prev, batch.init, tables_, masks, c.options);
   c.o = batch.o;
-  if (!scalar_critic_ && !Paper(switches_.o2v_option_in_update)) {
-    if (fixed && !fixed->o.empty()) {
-      c.o = fixed->o;
-    } else {
-      SampleCategorical(P, redraw_rng_, c.o);
-    }
-  }
+  if (Redraws() && !scalar_critic_) Redraw(fixed, c);  // a scalar critic is fed every option
   critic_net_.ForwardAll(batch.s, c.o, W_o, critic_table_, c.all);
 
   c.logp.resize(B);
@@ -247,12 +264,12 @@ LossTerms Option2Vec::OptionLoss(const Batch& batch, const FixedDraws* fixed) {
     dq.col(b) = c.dv(b) * P.col(b);
   }
   critic_net_.Backward(batch.s, c.o, W_o, c.all);
-  if (frozen_ && switches_.o2v_freeze == o2v::Freeze::kPolicy) return terms;  // P is detached
+  if (frozen_ && switches_.o2v_freeze == Freeze::kPolicy) return terms;  // P is detached
   options_.Backward(batch.s, batch.o_prev, tables_, masks, c.options);
   if (frozen_) options_.W_o.grad.setZero();
   if (!Paper(switches_.adam_idle)) {
-    // The initial net enters the graph with the first flagged row; spec 2.7.
-    for (const std::size_t i : init_params_) in_graph_[kOption][i] = !c.options.init_rows.empty();
+    // The net of first states is in the graph of a minibatch that has one; spec 2.7.
+    for (const std::size_t i : start_params_) in_graph_[kOption][i] = !c.options.start_rows.empty();
   }
   return terms;
 }
@@ -265,14 +282,12 @@ LossTerms Option2Vec::ActionLoss(const Batch& batch, const FixedDraws* fixed) {
   action_.Tabulate(W_o, action_table_);
   critic_net_.Tabulate(W_o, critic_table_);
   c.o = batch.o;
-  if (!Paper(switches_.o2v_option_in_update)) {
-    if (fixed && !fixed->o.empty()) {
-      c.o = fixed->o;
-    } else {
+  if (Redraws()) {
+    if (!fixed || fixed->o.empty()) {
       options_.Tabulate(tables_);
       options_.Forward(batch.s, batch.o_prev, batch.init, tables_, Dropout(B, fixed, c), c.options);
-      SampleCategorical(c.options.P, redraw_rng_, c.o);
     }
+    Redraw(fixed, c);
   }
   const Mat &mu = c.action.mu, &sigma = c.action.sigma;
   action_.Forward(batch.s, c.o, action_table_, c.action);

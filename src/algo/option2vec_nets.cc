@@ -7,8 +7,6 @@
 namespace o2v {
 namespace {
 
-constexpr double kHeadGain = 1e-3;  // of mu and sigma, spec 2.6 item 7
-
 /// y.col(b) := ReLU(y.col(b) + table.col(o[b])).
 void AddTableRelu(const Mat& table, std::span<const int> o, Mat& y) {
   for (Index b = 0; b < y.cols(); ++b) {
@@ -39,12 +37,12 @@ void BackwardNormalized(LayerNorm& norm, Linear& linear, const LayerNorm::Cache&
 PolicyOverOptions::PolicyOverOptions(const Option2VecSizes& n, const Form& form,
                                      const Initialiser& init)
     : W_o("embed.W_o", n.D, n.K),
-      init0("init.0", n.S, n.h_init),
-      init1("init.1", n.h_init, n.K),
+      start0("init.0", n.S, n.h_start),
+      start1("init.1", n.h_start, n.K),
       form_(form) {
   init.Orthogonal(W_o.value, 1);  // rows of E = W_o^T orthonormal for K <= D; spec 2.6 item 1
-  init.XavierUniform(init0.W.value);
-  init.XavierUniform(init1.W.value);
+  init.XavierUniform(start0.W.value);
+  init.XavierUniform(start1.W.value);
   if (form.two_tokens) {
     state = Linear("state", n.S, n.D);
     init.Orthogonal(state.W.value, 1);
@@ -62,8 +60,8 @@ PolicyOverOptions::PolicyOverOptions(const Option2VecSizes& n, const Form& form,
 
 std::vector<Param*> PolicyOverOptions::Params() {
   std::vector<Param*> params = {&W_o};
-  Append(params, init0.Params());
-  Append(params, init1.Params());
+  Append(params, start0.Params());
+  Append(params, start1.Params());
   Append(params, form_.two_tokens ? state.Params() : query.Params());
   Append(params, norm.Params());
   Append(params, block.Params());
@@ -71,9 +69,9 @@ std::vector<Param*> PolicyOverOptions::Params() {
   return params;
 }
 
-std::vector<Param*> PolicyOverOptions::InitParams() {
-  std::vector<Param*> params = init0.Params();
-  Append(params, init1.Params());
+std::vector<Param*> PolicyOverOptions::StartParams() {
+  std::vector<Param*> params = start0.Params();
+  Append(params, start1.Params());
   return params;
 }
 
@@ -105,50 +103,50 @@ void PolicyOverOptions::Forward(const ConstMatRef& s, std::span<const int> o_pre
   c.z.colwise() += logits.b.value.col(0);
 
   // First states of episodes: z := z_init(s).
-  c.init_rows.clear();
-  c.init_rows.reserve(std::size_t(B));
+  c.start_rows.clear();
+  c.start_rows.reserve(std::size_t(B));
   for (Index b = 0; b < B; ++b) {
-    if (init[std::size_t(b)]) c.init_rows.push_back(int(b));
+    if (init[std::size_t(b)]) c.start_rows.push_back(int(b));
   }
-  c.init_s.resize(s.rows(), B);
-  c.init_hidden.resize(init0.W.value.rows(), B);
-  c.init_z.resize(K, B);
-  if (const Index n = Index(c.init_rows.size()); n > 0) {
-    for (Index i = 0; i < n; ++i) c.init_s.col(i) = s.col(c.init_rows[std::size_t(i)]);
-    auto hidden = c.init_hidden.leftCols(n);
-    auto z = c.init_z.leftCols(n);
-    init0.Multiply(c.init_s.leftCols(n), hidden);
-    BiasActivate(Activation::kRelu, init0.b.value, hidden);
-    init1.Forward(hidden, z);
+  c.start_s.resize(s.rows(), B);
+  c.start_hidden.resize(start0.W.value.rows(), B);
+  c.start_z.resize(K, B);
+  if (const Index n = Index(c.start_rows.size()); n > 0) {
+    for (Index i = 0; i < n; ++i) c.start_s.col(i) = s.col(c.start_rows[std::size_t(i)]);
+    auto hidden = c.start_hidden.leftCols(n);
+    auto z = c.start_z.leftCols(n);
+    start0.Multiply(c.start_s.leftCols(n), hidden);
+    BiasActivate(Activation::kRelu, start0.b.value, hidden);
+    start1.Forward(hidden, z);
     if (form_.init_relu) z = z.cwiseMax(0);
-    for (Index i = 0; i < n; ++i) c.z.col(c.init_rows[std::size_t(i)]) = z.col(i);
+    for (Index i = 0; i < n; ++i) c.z.col(c.start_rows[std::size_t(i)]) = z.col(i);
   }
   LogSoftmax(c.z, c.log_P, c.P);
 }
 
-void PolicyOverOptions::BackwardInitial(Cache& c) {
-  c.init_dz.resize(c.dz.rows(), c.dz.cols());
-  c.init_dhidden.resize(c.init_hidden.rows(), c.dz.cols());
-  const Index n = Index(c.init_rows.size());
+void PolicyOverOptions::BackwardStart(Cache& c) {
+  c.start_dz.resize(c.dz.rows(), c.dz.cols());
+  c.start_dhidden.resize(c.start_hidden.rows(), c.dz.cols());
+  const Index n = Index(c.start_rows.size());
   if (n == 0) return;
-  auto dz = c.init_dz.leftCols(n);
-  auto dhidden = c.init_dhidden.leftCols(n);
+  auto dz = c.start_dz.leftCols(n);
+  auto dhidden = c.start_dhidden.leftCols(n);
   for (Index i = 0; i < n; ++i) {
-    dz.col(i) = c.dz.col(c.init_rows[std::size_t(i)]);
-    c.dz.col(c.init_rows[std::size_t(i)]).setZero();  // nothing reaches the attention
+    dz.col(i) = c.dz.col(c.start_rows[std::size_t(i)]);
+    c.dz.col(c.start_rows[std::size_t(i)]).setZero();  // nothing reaches the attention
   }
-  if (form_.init_relu) ActivationBackward(Activation::kRelu, c.init_z.leftCols(n), dz);
-  init1.AddGrad(c.init_hidden.leftCols(n), dz);
-  init1.BackwardInput(dz, dhidden);
-  ActivationBackward(Activation::kRelu, c.init_hidden.leftCols(n), dhidden);
-  init0.AddGrad(c.init_s.leftCols(n), dhidden);
+  if (form_.init_relu) ActivationBackward(Activation::kRelu, c.start_z.leftCols(n), dz);
+  start1.AddGrad(c.start_hidden.leftCols(n), dz);
+  start1.BackwardInput(dz, dhidden);
+  ActivationBackward(Activation::kRelu, c.start_hidden.leftCols(n), dhidden);
+  start0.AddGrad(c.start_s.leftCols(n), dhidden);
 }
 
 void PolicyOverOptions::Backward(const ConstMatRef& s, std::span<const int> o_prev,
                                  const Tables& tables, const AttentionBlock::Masks* masks,
                                  Cache& c) {
   const Index B = s.cols(), D = W_o.value.rows(), K = W_o.value.cols();
-  BackwardInitial(c);
+  BackwardStart(c);
   c.dtokens.resize(D, Tokens() * B);
   for (Index token = 0; token < Tokens(); ++token) {
     AddABt(c.dz, c.block.out.middleCols(token * B, B), logits.W.grad.middleCols(token * D, D));
@@ -156,7 +154,8 @@ void PolicyOverOptions::Backward(const ConstMatRef& s, std::span<const int> o_pr
   }
   logits.b.grad.col(0) += c.dz.rowwise().sum();
 
-  c.dx.resize(D, form_.prev_embed_grad ? Tokens() * B : B);  // the state's token is the first
+  const Index passing = form_.prev_embed_grad ? Tokens() * B : B;  // columns with a gradient: the
+  c.dx.resize(D, passing);                                         // state tokens are the first
   block.Backward(c.x, W_o.value, tables.memory, masks, c.block, c.dtokens, c.dx, W_o.grad);
   auto dx0 = c.dx.leftCols(B);
   norm.Backward(c.norm, dx0, dx0);

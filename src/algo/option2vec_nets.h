@@ -13,10 +13,10 @@
 
 namespace o2v {
 
-/// Sizes: state, action, options, embedding, FFN, attention heads, hidden, hidden of the initial
-/// net.
+/// Sizes: state, action, options, embedding, FFN, attention heads, hidden, hidden of the net of
+/// first states.
 struct Option2VecSizes {
-  Index S, A, K, D, F, heads, h, h_init;
+  Index S, A, K, D, F, heads, h, h_start;
 };
 
 /// Option policy P(o | s, o_{t-1}; W_o): attention of a query made of (s, o_hat_{t-1}) over the
@@ -32,10 +32,10 @@ struct PolicyOverOptions {
     bool prev_embed_grad;  // o2v_prev_embed_grad = paper: the gradient reaches o_hat_{t-1}
   };
 
-  Param W_o;             // (D, K)
-  Linear init0, init1;   // S -> h_init -> K
-  EmbeddedLinear query;  // one token: [s, o_hat] -> D
-  Linear state;          // two tokens: s -> D
+  Param W_o;              // (D, K)
+  Linear start0, start1;  // of first states, S -> h_start -> K
+  EmbeddedLinear query;   // one token: [s, o_hat] -> D
+  Linear state;           // two tokens: s -> D
   LayerNorm norm;
   AttentionBlock block;
   Linear logits;  // D or 2 D -> K
@@ -50,15 +50,15 @@ struct PolicyOverOptions {
     Mat dtokens;      // (D, n)
     LayerNorm::Cache norm;
     AttentionBlock::Cache block;
-    std::vector<int> init_rows;  // samples with the initial flag; they fill the first columns of
-    Mat init_s, init_hidden, init_z, init_dz, init_dhidden;  // these, which are B wide
+    std::vector<int> start_rows;  // samples with the initial flag; they fill the first columns of
+    Mat start_s, start_hidden, start_z, start_dz, start_dhidden;  // these, which are B wide
     Mat dtable;  // (D, K) adjoint of the table of `query`
   };
 
   PolicyOverOptions() = default;
   PolicyOverOptions(const Option2VecSizes& sizes, const Form& form, const Initialiser& init);
 
-  /// What follows from the weights alone, made once while they stand.
+  /// Products of weights alone: computed anew after every step of the optimiser.
   struct Tables {
     MemoryAttention::Memory memory;
     Mat query;  // (D, K) of `query`
@@ -74,11 +74,11 @@ struct PolicyOverOptions {
 
   Index Tokens() const { return form_.two_tokens ? 2 : 1; }
   std::vector<Param*> Params();
-  /// Those of the initial net.
-  std::vector<Param*> InitParams();
+  /// Those of the net of first states.
+  std::vector<Param*> StartParams();
 
  private:
-  void BackwardInitial(Cache& c);
+  void BackwardStart(Cache& c);
 
   Form form_{};
 };
@@ -99,7 +99,7 @@ struct ActionPolicyNet {
   ActionPolicyNet() = default;
   ActionPolicyNet(const Option2VecSizes& sizes, const Initialiser& init);
 
-  /// W_o (D, K) -> table (h, K), which follows from the weights alone.
+  /// W_o (D, K) -> table (h, K) = W_e W_o + b, what each option adds to the first layer.
   void Tabulate(const Mat& W_o, Mat& table) const { layer0.MakeTable(W_o, table); }
   /// s (S, B), o (B) -> c.mu, c.sigma.
   void Forward(const ConstMatRef& s, std::span<const int> o, const Mat& table, Cache& c) const;
@@ -140,7 +140,8 @@ struct OptionValueNet {
   OptionValueNet() = default;
   OptionValueNet(const Option2VecSizes& sizes, bool scalar, const Initialiser& init);
 
-  /// W_o (D, K) -> table (h, K), which follows from the weights alone. Scalar form only.
+  /// W_o (D, K) -> table (h, K) = W_e W_o + b, what each option adds to the first layer. Scalar
+  /// form only.
   void Tabulate(const Mat& W_o, Mat& table) const {
     if (scalar_) layer0.MakeTable(W_o, table);
   }

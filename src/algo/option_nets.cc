@@ -9,8 +9,6 @@
 namespace o2v {
 namespace {
 
-constexpr double kHeadGain = 1e-3;  // spec 2.1
-
 std::string OptionName(Index k, const std::string& part) {
   return "option" + std::to_string(k) + "." + part;
 }
@@ -32,8 +30,7 @@ void SortByOption(std::span<const int> o, Index K, std::vector<int>& sample,
 
 }  // namespace
 
-// ---- One network an option
-// ---------------------------------------------------------------------------------------
+// ---- One network per option ---------------------------------------------------------------------
 
 PerOptionMlps::PerOptionMlps(const std::string& name, Index K, Index S, Index h, Index n_out,
                              Activation activation, const Initialiser& init) {
@@ -204,13 +201,18 @@ void OptionNets::Master(const ConstMatRef& s, CallAndReturnCache& c) const {
   LogSoftmax(c.master.out, c.log_pi, c.pi);
 }
 
+void OptionNets::BetaAndMask(const ConstMatRef& s, std::span<const int> o_prev, Fidelity beta_index,
+                             CallAndReturnCache& c) const {
+  Beta(s, o_prev, beta_index == Fidelity::kReleased, c.beta);
+  c.M.resize(beta.K(), s.cols());
+  OneHot(o_prev, c.M);
+}
+
 void OptionNets::CallAndReturn(const ConstMatRef& s, std::span<const int> o_prev,
                                std::span<const char> init, const Mat& pi, Fidelity beta_index,
                                CallAndReturnCache& c) const {
-  Beta(s, o_prev, beta_index == Fidelity::kReleased, c.beta);
-  c.M.resize(pi.rows(), pi.cols());
-  OneHot(o_prev, c.M);
-  o2v::CallAndReturn(pi, c.beta.beta, c.M, o_prev, init, beta_index, c.pi_hat);
+  BetaAndMask(s, o_prev, beta_index, c);
+  MixCallAndReturn(pi, c.beta.beta, c.M, o_prev, init, beta_index, c.pi_hat);
 }
 
 std::vector<Param*> OptionNets::UsedParams() {

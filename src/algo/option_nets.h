@@ -1,5 +1,5 @@
 #pragma once
-// The networks of the methods with one network an option: intra-option policies, terminations.
+// The networks of the methods with one network per option: intra-option policies, terminations.
 
 #include <span>
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace o2v {
 
-/// K networks of one shape, one an option. A batch passes each sample through the network of one
+/// K networks of one shape, one per option. A batch passes each sample through the network of one
 /// option, at the cost of a single network, or through all K.
 class PerOptionMlps {
  public:
@@ -115,8 +115,11 @@ struct OptionNets {
   };
   /// s (S, B) -> c.pi, c.log_pi.
   void Master(const ConstMatRef& s, CallAndReturnCache& c) const;
-  /// s (S, B), o_prev, init (B) -> c.pi_hat of spec 3.5, the mixture with pi (K, B): c.pi, or what
-  /// chooses in place of the master policy.
+  /// s (S, B), o_prev (B) -> c.beta, as `beta_index` asks, and c.M.
+  void BetaAndMask(const ConstMatRef& s, std::span<const int> o_prev, Fidelity beta_index,
+                   CallAndReturnCache& c) const;
+  /// BetaAndMask, and c.pi_hat of spec 3.5, the mixture with pi (K, B): c.pi, or what chooses in
+  /// place of the master policy.
   void CallAndReturn(const ConstMatRef& s, std::span<const int> o_prev, std::span<const char> init,
                      const Mat& pi, Fidelity beta_index, CallAndReturnCache& c) const;
 

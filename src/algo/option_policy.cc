@@ -20,8 +20,8 @@ void NormalizeColumns(Mat& P) {
   for (Index b = 0; b < P.cols(); ++b) P.col(b) /= P.col(b).sum();
 }
 
-void CallAndReturn(const Mat& pi, const Mat& beta, const Mat& M, std::span<const int> o_prev,
-                   std::span<const char> init, Fidelity beta_index, Mat& pi_hat) {
+void MixCallAndReturn(const Mat& pi, const Mat& beta, const Mat& M, std::span<const int> o_prev,
+                      std::span<const char> init, Fidelity beta_index, Mat& pi_hat) {
   pi_hat.resize(pi.rows(), pi.cols());
   for (Index b = 0; b < pi.cols(); ++b) {
     const std::size_t i = std::size_t(b);
@@ -37,9 +37,9 @@ void CallAndReturn(const Mat& pi, const Mat& beta, const Mat& M, std::span<const
   }
 }
 
-void CallAndReturnBackward(const Mat& G, const Mat& pi, const Mat& beta, const Mat& M,
-                           std::span<const int> o_prev, std::span<const char> init,
-                           Fidelity beta_index, Mat& dz, Mat& db) {
+void MixCallAndReturnBackward(const Mat& G, const Mat& pi, const Mat& beta, const Mat& M,
+                              std::span<const int> o_prev, std::span<const char> init,
+                              Fidelity beta_index, Mat& dz, Mat& db) {
   dz.resize(pi.rows(), pi.cols());
   db.setZero(pi.rows(), pi.cols());
   for (Index b = 0; b < pi.cols(); ++b) {
@@ -67,7 +67,7 @@ void SoftmaxBackward(const Mat& p, const Mat& dp, Mat& dz) {
   }
 }
 
-void PickRows(const Mat& log_p, std::span<const int> o, Vec& logp) {
+void PickEntries(const Mat& log_p, std::span<const int> o, Vec& logp) {
   logp.resize(log_p.cols());
   for (Index b = 0; b < log_p.cols(); ++b) logp(b) = log_p(o[std::size_t(b)], b);
 }

@@ -23,15 +23,15 @@ void NormalizeColumns(Mat& P);
 ///   beta_index = paper:     pi_hat_k = (1 - beta_{o'}) M_k + beta_{o'} pi_k
 ///   beta_index = released:  pi_hat_k = (1 - beta_k) M_k + beta_k pi_k, which need not sum to 1
 /// and pi_hat = pi where init. With `paper` only beta[o'] is read.
-void CallAndReturn(const Mat& pi, const Mat& beta, const Mat& M, std::span<const int> o_prev,
-                   std::span<const char> init, Fidelity beta_index, Mat& pi_hat);
+void MixCallAndReturn(const Mat& pi, const Mat& beta, const Mat& M, std::span<const int> o_prev,
+                      std::span<const char> init, Fidelity beta_index, Mat& pi_hat);
 /// G = dL/dpi_hat (K, B) -> dz, db (K, B), the adjoints of the logits of pi and of beta.
-void CallAndReturnBackward(const Mat& G, const Mat& pi, const Mat& beta, const Mat& M,
-                           std::span<const int> o_prev, std::span<const char> init,
-                           Fidelity beta_index, Mat& dz, Mat& db);
+void MixCallAndReturnBackward(const Mat& G, const Mat& pi, const Mat& beta, const Mat& M,
+                              std::span<const int> o_prev, std::span<const char> init,
+                              Fidelity beta_index, Mat& dz, Mat& db);
 
 /// log_p (K, B), o (B) -> logp (B), the entries o_b.
-void PickRows(const Mat& log_p, std::span<const int> o, Vec& logp);
+void PickEntries(const Mat& log_p, std::span<const int> o, Vec& logp);
 /// Mean over the batch of H = -sum_k p_k ln p_k; p, log_p (K, B).
 double MeanEntropy(const Mat& p, const Mat& log_p);
 

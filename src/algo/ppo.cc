@@ -21,8 +21,8 @@ class Ppo final : public PpoMethod {
   LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) override;
 
  private:
-  void Act(const Mat& s, std::span<const char> init, Index row) override;
-  void Values(const Choices& x, Index row) override;
+  void Act(const Mat& s, std::span<const char> init, Index first) override;
+  void Values(const Choices& x, Index first) override;
 
   struct Cache {
     Mlp::Cache actor, critic;  // the actor's output is mu (A, B)
@@ -49,8 +49,8 @@ Ppo::Ppo(const AlgorithmInput& in)
       rho_("actor.rho", in.A, 1) {
   const Index h = in.hyper->Int("hidden", 1);
   const Activation g = ReadActivation(*in.hyper);
-  actor_ = Mlp("actor.body", "actor.head", in.S, h, in.A, g, init_);
-  critic_net_ = Mlp("critic.body", "critic.v", in.S, h, 1, g, init_);
+  actor_ = Mlp("actor.body", "actor.head", in.S, h, in.A, g, initialiser_);
+  critic_net_ = Mlp("critic.body", "critic.v", in.S, h, 1, g, initialiser_);
   std::vector<Param*> params = actor_.Params();
   params.push_back(&rho_);
   Append(params, critic_net_.Params());
@@ -67,19 +67,19 @@ void Ppo::Actor(const ConstMatRef& s, Cache& c) const {
   Tanh(c.actor.out);
 }
 
-void Ppo::Act(const Mat& s, std::span<const char>, Index row) {
+void Ppo::Act(const Mat& s, std::span<const char>, Index first) {
   Cache& c = caches_(N_);
   MakeSigma();
   Actor(s, c);
   SampleGaussian(c.actor.out, sigma_, policy_rng_, a_);
   GaussianLogProb(a_, c.actor.out, sigma_, c.logp);
-  rollout_.batch.action.logp_old.segment(row, N_) = c.logp;
+  rollout_.batch.action.logp_old.segment(first, N_) = c.logp;
 }
 
-void Ppo::Values(const Choices& x, Index row) {
+void Ppo::Values(const Choices& x, Index first) {
   Mlp::Cache& critic = caches_(x.s.cols()).critic;
   critic_net_.Forward(x.s, critic);
-  Eigen::Map<VecD>(rollout_.critics[0].v.data() + row, x.s.cols()) =
+  Eigen::Map<VecD>(rollout_.critics[0].v.data() + first, x.s.cols()) =
       critic.out.row(0).transpose().cast<double>();
 }
 

@@ -27,30 +27,34 @@ PpoMethod::PpoMethod(const AlgorithmInput& in, Index K, std::vector<std::string>
 
 void PpoMethod::Collect(VecEnv& env, std::vector<Episode>& episodes) {
   Batch& batch = rollout_.batch;
+  const Index after = batch.Size();  // of v: the states after the rollout, and those at time limits
   BeforeRollout();
   for (int t = 0; t < T_; ++t) {
-    const Index row = Index(t) * N_;
-    Act(env.States(), env.EpisodeStarts(), row);
-    batch.s.middleCols(row, N_) = env.States();
-    batch.a.middleCols(row, N_) = a_;
+    const Index first = Index(t) * N_;
+    Act(env.States(), env.EpisodeStarts(), first);
+    batch.s.middleCols(first, N_) = env.States();
+    batch.a.middleCols(first, N_) = a_;
     env.Step(a_, transition_, episodes);
-    if (rollout_.RecordStep(transition_, t) && bootstrap_) {
-      Values(Imagine(transition_.s_last, not_initial_), batch.Size());
+    const bool time_limit = rollout_.RecordStep(transition_, t);
+    if (time_limit && bootstrap_) {
+      Values(DrawForBootstrap(transition_.s_last, not_initial_), after);
       rollout_.BootstrapTimeLimits(transition_, t, gamma_);
     }
   }
-  for (Index row = 0; row < batch.Size(); row += minibatch_) {  // the critics do not act
-    const Index n = std::min(Index(minibatch_), batch.Size() - row);
-    Values({batch.s.middleCols(row, n), Rows(batch.o_prev, row, n), Rows(batch.init, row, n),
-            Rows(batch.o, row, n), batch.P_old.middleCols(row, n)},
-           row);
+  // Acting needs no values: they are computed here, in blocks as large as a minibatch.
+  for (Index first = 0; first < after; first += minibatch_) {
+    const Index n = std::min(Index(minibatch_), after - first);
+    Values({batch.s.middleCols(first, n), Entries(batch.o_prev, first, n),
+            Entries(batch.init, first, n), Entries(batch.o, first, n),
+            batch.P_old.middleCols(first, n)},
+           first);
   }
-  Values(Imagine(env.States(), env.EpisodeStarts()), batch.Size());
+  Values(DrawForBootstrap(env.States(), env.EpisodeStarts()), after);
   rollout_.MakeTargets(gamma_, lambda_, adv_std_eps_);
   AfterRollout();
 }
 
-Choices PpoMethod::Imagine(const Mat& s, std::span<const char> init) {
+Choices PpoMethod::DrawForBootstrap(const Mat& s, std::span<const char> init) {
   return {s, o_prev_, init, {}, rollout_.batch.P_old.leftCols(0)};
 }
 

@@ -10,7 +10,7 @@
 namespace o2v {
 
 /// B states and what was chosen there: views, valid until the method acts or draws again. Values
-/// leaves what they show alone.
+/// does not change the data that they point to.
 struct Choices {
   ConstMatRef s;                // (S, B)
   std::span<const int> o_prev;  // (B) the options before
@@ -19,8 +19,12 @@ struct Choices {
   ConstMatRef P;                // (K, B) probabilities they were drawn with: two-stage methods
 };
 
-/// PPO around what a method supplies: how it acts, what a state is worth, its loss. Source: spec
-/// 1.3, 1.4; Schulman et al. 2017.
+/// PPO around what a method supplies: how it acts, what a state is worth, its loss. A training step
+/// is Collect and Update, both in ppo_method.cc:
+///   Collect   T times: Act -> VecEnv::Step -> Rollout::RecordStep
+///             Values of all states -> Rollout::MakeTargets: advantages, returns
+///   Update    each stage, each epoch, each minibatch: Gather -> Loss (adds gradients) -> Adam
+/// Source: spec 1.3, 1.4; Schulman et al. 2017.
 class PpoMethod : public Method {
  public:
   void Collect(VecEnv& env, std::vector<Episode>& episodes) final;
@@ -33,13 +37,13 @@ class PpoMethod : public Method {
             const LossColumns& more = {});
 
   /// Chooses a_ at the states s (S, N), after o_prev_; writes options, probabilities and
-  /// log-probabilities into the rollout's batch, at the columns from `row`.
-  virtual void Act(const Mat& s, std::span<const char> init, Index row) = 0;
-  /// What the method would choose at s (S, N), after o_prev_: drawn for the values alone and thrown
-  /// away. Source: spec 1.3.
-  virtual Choices Imagine(const Mat& s, std::span<const char> init);
-  /// Values of B states into entries row..row+B-1 of the critics' v.
-  virtual void Values(const Choices& x, Index row) = 0;
+  /// log-probabilities into the rollout's batch, from sample `first` on.
+  virtual void Act(const Mat& s, std::span<const char> init, Index first) = 0;
+  /// What the method would choose at s (S, N), after o_prev_: drawn for the values that a target is
+  /// bootstrapped from, and thrown away. Source: spec 1.3.
+  virtual Choices DrawForBootstrap(const Mat& s, std::span<const char> init);
+  /// Values of B states into the critics' v, from entry `first` on.
+  virtual void Values(const Choices& x, Index first) = 0;
   /// Around a rollout, in which the weights stand still.
   virtual void BeforeRollout() {}
   virtual void AfterRollout() {}

@@ -28,9 +28,9 @@ class Ppoc final : public PpoMethod {
   LossTerms Loss(int stage, const Batch& batch, const FixedDraws* fixed) override;
 
  private:
-  void Act(const Mat& s, std::span<const char> init, Index row) override;
-  Choices Imagine(const Mat& s, std::span<const char> init) override;
-  void Values(const Choices& x, Index row) override;
+  void Act(const Mat& s, std::span<const char> init, Index first) override;
+  Choices DrawForBootstrap(const Mat& s, std::span<const char> init) override;
+  void Values(const Choices& x, Index first) override;
 
   struct Cache {
     OptionNets::CallAndReturnCache options;
@@ -62,7 +62,7 @@ Ppoc::Ppoc(const AlgorithmInput& in)
       clip_(in.hyper->Real("ratio_clip")),
       w_(Real(in.hyper->Real("entropy_weight"))),
       eta_(Real(in.hyper->Real("termination_penalty"))) {
-  nets_ = MakeOptionNets(in, OptionNets::CriticHead::kQ, init_);
+  nets_ = MakeOptionNets(in, OptionNets::CriticHead::kQ, initialiser_);
   RegisterNetworks(in, nets_.Params(), {nets_.UsedParams()}, &nets_.policy, &nets_.critic);
   o_prev_.assign(std::size_t(N_), 0);
 }
@@ -75,19 +75,19 @@ const Mat& Ppoc::PiHat(const ConstMatRef& s, std::span<const int> o_prev,
   return c.pi_hat;
 }
 
-void Ppoc::Act(const Mat& s, std::span<const char> init, Index row) {
+void Ppoc::Act(const Mat& s, std::span<const char> init, Index first) {
   Cache& c = caches_(N_);
   c.o.resize(std::size_t(N_));
   SampleCategorical(PiHat(s, o_prev_, init), policy_rng_, c.o);
   SampleAction(nets_.policy, s, c.o, policy_rng_, a_, c.action);
   LogDensity(switches_.density_log_eps, c.action.logp, c.action.slope);
-  rollout_.batch.action.logp_old.segment(row, N_) = c.action.logp;
-  RecordOptions(row, c.o, init, rollout_.batch);
+  rollout_.batch.action.logp_old.segment(first, N_) = c.action.logp;
+  RecordOptions(first, c.o, init, rollout_.batch);
 }
 
 /// o ~ pi_hat(. | s, o').
-Choices Ppoc::Imagine(const Mat& s, std::span<const char> init) {
-  Choices x = PpoMethod::Imagine(s, init);
+Choices Ppoc::DrawForBootstrap(const Mat& s, std::span<const char> init) {
+  Choices x = PpoMethod::DrawForBootstrap(s, init);
   Cache& c = caches_(N_);
   SampleCategorical(PiHat(s, o_prev_, init), bootstrap_rng_, c.o);
   x.o = c.o;
@@ -95,9 +95,9 @@ Choices Ppoc::Imagine(const Mat& s, std::span<const char> init) {
 }
 
 /// v = q_o.
-void Ppoc::Values(const Choices& x, Index row) {
+void Ppoc::Values(const Choices& x, Index first) {
   EntryValues(nets_.critic, x.s, x.o, caches_(x.s.cols()).value.critic,
-              rollout_.critics[0].v.data() + row);
+              rollout_.critics[0].v.data() + first);
 }
 
 LossTerms Ppoc::Loss(int, const Batch& batch, const FixedDraws*) {

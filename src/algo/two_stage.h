@@ -19,10 +19,10 @@ class TwoStageMethod : public PpoMethod {
   }
 
  protected:
-  enum Stage { kOption = 0, kAction = 1 };
+  enum Stage { kOption = 0, kAction = 1 };  // "high" and "low" in updates.csv, DAC's words
 
   /// (K, B) what an option is drawn with, not always normalised, and its logarithm. Valid until
-  /// Options is asked again for as many states.
+  /// Options is called again with the same number of states.
   struct OptionDistribution {
     const Mat &P, &log_P;
   };
@@ -40,9 +40,9 @@ class TwoStageMethod : public PpoMethod {
   virtual LossTerms ActionLoss(const Batch& batch, const FixedDraws* fixed) = 0;
 
  private:
-  void Act(const Mat& s, std::span<const char> init, Index row) final;
-  Choices Imagine(const Mat& s, std::span<const char> init) final;
-  void Values(const Choices& x, Index row) final;
+  void Act(const Mat& s, std::span<const char> init, Index first) final;
+  Choices DrawForBootstrap(const Mat& s, std::span<const char> init) final;
+  void Values(const Choices& x, Index first) final;
 
   Rng& bootstrap_rng_ = NewStream("bootstrap");
   std::vector<int> o_;  // (N)

@@ -1,5 +1,5 @@
 #pragma once
-// Named numbers that a method or task reads: hyper-parameters and switches, with their origin.
+// The numbers that a method reads, with their origin.
 
 #include <cstdint>
 #include <map>
@@ -11,7 +11,7 @@
 
 namespace o2v {
 
-/// Flat table key -> number or word. A reader asks for what it needs; a key that nobody asked for
+/// Flat table key -> number. A reader asks for what it needs; a key that nobody asked for
 /// is an error of the configuration, found by `Unused` before the first step.
 class Settings {
  public:

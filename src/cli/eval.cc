@@ -11,8 +11,8 @@
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "cli/policy_file.h"
-#include "harness/evaluate.h"
-#include "harness/stats.h"
+#include "report/stats.h"
+#include "run/evaluate.h"
 
 namespace o2v {
 

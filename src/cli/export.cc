@@ -9,10 +9,9 @@
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "cli/policy_file.h"
-#include "harness/checkpoint.h"
-#include "harness/interpret.h"
-#include "harness/record.h"
-#include "harness/tensorboard.h"
+#include "report/tensorboard.h"
+#include "run/checkpoint.h"
+#include "run/record.h"
 
 namespace o2v {
 

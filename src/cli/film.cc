@@ -14,10 +14,10 @@
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "cli/policy_file.h"
-#include "harness/config.h"
-#include "harness/evaluate.h"
 #include "render/renderer.h"
 #include "render/video.h"
+#include "run/config.h"
+#include "run/evaluate.h"
 
 namespace o2v {
 namespace {

@@ -6,7 +6,7 @@
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "cli/policy_file.h"
-#include "harness/evaluate.h"
+#include "run/evaluate.h"
 
 namespace o2v {
 

@@ -11,9 +11,9 @@
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "cli/policy_file.h"
-#include "harness/checkpoint.h"
-#include "harness/interpret.h"
-#include "harness/record.h"
+#include "report/interpret.h"
+#include "run/checkpoint.h"
+#include "run/record.h"
 
 namespace o2v {
 

@@ -9,7 +9,7 @@
 #include "base/printable.h"
 #include "cli/commands.h"
 #include "cli/options.h"
-#include "harness/jobs.h"
+#include "report/jobs.h"
 
 namespace o2v {
 namespace {

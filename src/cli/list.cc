@@ -12,8 +12,8 @@
 #include "cli/commands.h"
 #include "env/env.h"
 #include "env/pairs.h"
-#include "harness/align.h"
-#include "harness/config.h"
+#include "report/align.h"
+#include "run/config.h"
 
 namespace o2v {
 namespace {

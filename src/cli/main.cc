@@ -11,8 +11,8 @@
 #include "base/files.h"
 #include "base/printable.h"
 #include "cli/commands.h"
-#include "harness/manifest.h"
 #include "nn/isa.h"
+#include "run/manifest.h"
 
 namespace o2v {
 namespace {

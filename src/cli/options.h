@@ -10,7 +10,7 @@
 
 #include "base/check.h"
 #include "base/decimal.h"
-#include "harness/config.h"
+#include "run/config.h"
 
 namespace o2v {
 

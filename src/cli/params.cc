@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "cli/commands.h"
-#include "harness/param_table.h"
+#include "report/param_table.h"
 
 namespace o2v {
 

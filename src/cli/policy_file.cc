@@ -5,7 +5,7 @@
 
 #include "base/check.h"
 #include "env/pairs.h"
-#include "harness/checkpoint.h"
+#include "run/checkpoint.h"
 
 namespace o2v {
 

@@ -6,8 +6,8 @@
 
 #include "algo/algorithm.h"
 #include "env/env.h"
-#include "harness/config.h"
 #include "rollout/normalizer.h"
+#include "run/config.h"
 
 namespace o2v {
 

@@ -8,9 +8,9 @@
 #include "base/check.h"
 #include "base/files.h"
 #include "cli/commands.h"
-#include "harness/config.h"
-#include "harness/manifest.h"
-#include "harness/record.h"
+#include "run/config.h"
+#include "run/manifest.h"
+#include "run/record.h"
 
 namespace o2v {
 

@@ -7,7 +7,7 @@
 #include "base/decimal.h"
 #include "cli/commands.h"
 #include "cli/options.h"
-#include "env/replay.h"
+#include "report/replay.h"
 
 namespace o2v {
 

@@ -10,7 +10,7 @@
 #include "base/files.h"
 #include "cli/commands.h"
 #include "cli/options.h"
-#include "harness/summary.h"
+#include "report/summary.h"
 
 namespace o2v {
 

@@ -8,8 +8,8 @@
 #include "base/check.h"
 #include "cli/commands.h"
 #include "cli/options.h"
-#include "harness/config.h"
-#include "harness/trainer.h"
+#include "run/config.h"
+#include "run/trainer.h"
 
 namespace o2v {
 

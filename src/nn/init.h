@@ -6,6 +6,9 @@
 
 namespace o2v {
 
+/// Gain of output layers, of mu and sigma too. Source: spec 2.1, 2.6 item 7.
+inline constexpr double kHeadGain = 1e-3;
+
 /// gain x the Q factor of a Gaussian matrix, signs fixed by R's diagonal: rows orthonormal when
 /// rows <= cols, else columns. Source: spec 2.1 (Saxe et al. 2014).
 void Orthogonal(Mat& W, double gain, Rng& rng);

@@ -1,11 +1,6 @@
 #include "nn/mlp.h"
 
 namespace o2v {
-namespace {
-
-constexpr double kHeadGain = 1e-3;  // spec 2.1
-
-}  // namespace
 
 MlpTrunk::MlpTrunk(const std::string& name, Index n_in, Index h, Activation activation,
                    const Initialiser& init)

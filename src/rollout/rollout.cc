@@ -16,7 +16,7 @@ bool RecordEnds(const Transition& transition, int t, MatD& mask) {
 Rollout::Rollout(Index S, Index A, int N, int T, int n_critics)
     : mask(MatD::Ones(N, T)), critics(std::size_t(n_critics), CriticTargets(N, T)) {
   batch.Resize(S, A, Index(N) * T);
-  batch.P_old.resize(0, batch.Size());
+  batch.P_old.resize(0, batch.Size());  // two-stage methods give it K rows
 }
 
 bool Rollout::RecordStep(const Transition& transition, int t) {
@@ -33,8 +33,9 @@ void Rollout::BootstrapTimeLimits(const Transition& transition, int t, double ga
 }
 
 void Rollout::MakeTargets(double gamma, double lambda, double adv_std_eps) {
-  for (CriticTargets& critic : critics) {
-    StageTargets& out = &critic == &critics.back() ? batch.action : batch.option;
+  for (std::size_t i = 0; i < critics.size(); ++i) {
+    CriticTargets& critic = critics[i];
+    StageTargets& out = i + 1 < critics.size() ? batch.option : batch.action;
     Gae(critic.r, mask, critic.v, gamma, lambda, critic.adv, critic.ret);
     NormalizeAdvantages(critic.adv, adv_std_eps, out.adv_hat);
     out.ret = Eigen::Map<const VecD>(critic.ret.data(), critic.ret.size()).cast<Real>();

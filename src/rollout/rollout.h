@@ -23,10 +23,10 @@ struct CriticTargets {
 /// one of them ended by its time limit only.
 bool RecordEnds(const Transition& transition, int t, MatD& mask);
 
-/// Entries row..row+n-1 of an array with an entry a sample.
+/// n entries of an array that has one per sample, from `first` on.
 template <typename T>
-std::span<const T> Rows(const std::vector<T>& x, Index row, Index n) {
-  return std::span<const T>(x).subspan(std::size_t(row), std::size_t(n));
+std::span<const T> Entries(const std::vector<T>& x, Index first, Index n) {
+  return std::span<const T>(x).subspan(std::size_t(first), std::size_t(n));
 }
 
 /// A rollout of T steps of N workers with one critic, whose advantages and targets are

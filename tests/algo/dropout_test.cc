@@ -37,7 +37,7 @@ struct Dropping {
   RunConfig config = SmallConfig("option2vec", Fidelity::kReleased);
   VecEnv env = PointTask(config.workers, /*time_limit=*/5);
   std::unique_ptr<Algorithm> algorithm = MakeRunAlgorithm(config, env.Spec());
-  Option2VecSizes sizes{.S = 1, .A = 1, .K = 4, .D = 6, .F = 7, .heads = 1, .h = 8, .h_init = 16};
+  Option2VecSizes sizes{.S = 1, .A = 1, .K = 4, .D = 6, .F = 7, .heads = 1, .h = 8, .h_start = 16};
   PolicyOverOptions net{
       sizes, {.two_tokens = true, .init_relu = true, .prev_embed_grad = false}, Initialiser()};
   PolicyOverOptions::Tables tables;

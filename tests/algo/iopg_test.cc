@@ -87,6 +87,31 @@ TEST(Iopg, GradientsDoNotDependOnTheEpisodeBefore) {
   }
 }
 
+TEST(Iopg, AnOptionThatTheMasterNeverTakesHasNoGradientAndSpoilsNoOther) {
+  // A logit 200 below the others: all that is left of its probability are the last bits of floats.
+  for (const char* init_flag : {"iopg_init_flag=paper", "iopg_init_flag=released"}) {
+    for (const char* posterior : {"iopg_posterior=paper", "iopg_posterior=released"}) {
+      const RunConfig config = SmallConfig("iopg", Fidelity::kPaper, {init_flag, posterior});
+      const auto iopg = MakeRunAlgorithm(config, Sizes(5, 3));
+      const std::string last = "option" + std::to_string(iopg->NumOptions() - 1) + ".";
+      for (Param* p : iopg->Params()) {
+        if (p->name == "master.head.b") p->value(iopg->NumOptions() - 1, 0) = -200;
+      }
+      const std::vector<Mat> gradients = GradientsOf(*iopg, 6);
+      for (std::size_t i = 0; i < gradients.size(); ++i) {
+        const std::string& name = iopg->Params()[i]->name;
+        EXPECT_TRUE(gradients[i].allFinite()) << name << " " << init_flag << " " << posterior;
+        if (name.starts_with(last)) {
+          EXPECT_LT(gradients[i].cwiseAbs().maxCoeff(), 1e-30) << name;
+        }
+        if (name == "option0.mu.head.W") {
+          EXPECT_GT(gradients[i].cwiseAbs().maxCoeff(), 0);
+        }
+      }
+    }
+  }
+}
+
 /// Steps of the running episode of each worker's copy.
 class Lengths final : public StateVisitor {
  public:

@@ -32,8 +32,8 @@ struct State {
 
   State(Fidelity beta_index, bool first = false) {
     init[0] = first;
-    CallAndReturn(pi, beta, M, o_prev, init, beta_index, pi_hat);
-    CallAndReturnBackward(G, pi, beta, M, o_prev, init, beta_index, dz, db);
+    MixCallAndReturn(pi, beta, M, o_prev, init, beta_index, pi_hat);
+    MixCallAndReturnBackward(G, pi, beta, M, o_prev, init, beta_index, dz, db);
   }
 };
 
@@ -76,10 +76,10 @@ TEST(OneHot, MarksOneRowAColumn) {
   EXPECT_EQ(M, (Mat(3, 2) << 0, 1, 0, 0, 1, 0).finished());
 }
 
-TEST(PickRows, TakesTheEntryOfEachColumnsOption) {
+TEST(PickEntries, TakesTheEntryOfEachColumnsOption) {
   const Mat log_p = (Mat(3, 2) << 1, 2, 3, 4, 5, 6).finished();
   Vec logp;
-  PickRows(log_p, std::vector<int>{2, 0}, logp);
+  PickEntries(log_p, std::vector<int>{2, 0}, logp);
   EXPECT_EQ(logp, (Vec(2) << 5, 2).finished());
 }
 

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "algo/setup.h"
-#include "harness/param_table.h"
+#include "report/param_table.h"
 
 namespace o2v {
 namespace {

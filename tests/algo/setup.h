@@ -1,12 +1,12 @@
 #pragma once
-// Small methods, as the harness makes them.
+// Small methods, as a run makes them.
 
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "algo/toy.h"
-#include "harness/config.h"
+#include "run/config.h"
 
 namespace o2v {
 

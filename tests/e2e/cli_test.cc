@@ -128,7 +128,7 @@ TEST_F(Program, ListsNameTasksMethodsAndSwitches) {
 TEST_F(Program, ParamsPrintsThePapersRatio) {
   const std::string text = Run("params").out;
   EXPECT_NE(text.find("30598 / 193473 = 15.8 %"), std::string::npos) << text;
-  // Spec 2.2, 2.6, 2.7, S = 17, A = 6. The rows of --csv: tests/harness/param_table_test.cc.
+  // Spec 2.2, 2.6, 2.7, S = 17, A = 6. The rows of --csv: tests/report/param_table_test.cc.
   for (const char* size : {" 11085 ", " 31615 ", " 30598 "}) {
     EXPECT_NE(text.find(size), std::string::npos) << size;
   }

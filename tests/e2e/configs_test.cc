@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "harness/jobs.h"
-#include "harness/trainer.h"
+#include "report/jobs.h"
+#include "run/trainer.h"
 #include "test_folder.h"
 
 namespace o2v {

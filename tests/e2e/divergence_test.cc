@@ -5,10 +5,10 @@
 #include <sstream>
 
 #include "base/files.h"
-#include "harness/checkpoint.h"
-#include "harness/metrics.h"
-#include "harness/record.h"
-#include "harness/trainer.h"
+#include "run/checkpoint.h"
+#include "run/metrics.h"
+#include "run/record.h"
+#include "run/trainer.h"
 #include "test_folder.h"
 
 namespace o2v {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "algo/setup.h"
-#include "harness/stats.h"
+#include "report/stats.h"
 
 namespace o2v {
 namespace {

@@ -13,9 +13,9 @@
 
 #include "base/csv.h"
 #include "env/mujoco_env.h"
-#include "harness/config.h"
-#include "harness/trainer.h"
 #include "program.h"
+#include "run/config.h"
+#include "run/trainer.h"
 
 namespace o2v {
 namespace {

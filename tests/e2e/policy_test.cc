@@ -10,10 +10,10 @@
 
 #include "algo/toy.h"
 #include "base/csv.h"
-#include "harness/checkpoint.h"
-#include "harness/config.h"
-#include "harness/evaluate.h"
 #include "program.h"
+#include "run/checkpoint.h"
+#include "run/config.h"
+#include "run/evaluate.h"
 
 namespace o2v {
 namespace {

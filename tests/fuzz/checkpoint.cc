@@ -5,7 +5,7 @@
 // one, each {place (2 bytes), number of bytes to drop, number of bytes to put in, these}. A file
 // whose only fault is its checksum is tried once more with the right one: damage behind it counts.
 
-#include "harness/checkpoint.h"
+#include "run/checkpoint.h"
 
 #include <algorithm>
 #include <memory>
@@ -14,9 +14,9 @@
 #include "base/files.h"
 #include "env/env.h"
 #include "fuzz/target.h"
-#include "harness/config.h"
-#include "harness/trainer.h"
 #include "rollout/vec_env.h"
+#include "run/config.h"
+#include "run/trainer.h"
 #include "test_folder.h"
 
 namespace o2v {

@@ -1,7 +1,7 @@
 // Lists of seeds, and the lines that `jobs` prints. The input is three words, separated by NUL:
 // seeds, program, folder of the results.
 
-#include "harness/jobs.h"
+#include "report/jobs.h"
 
 #include <algorithm>
 #include <vector>

@@ -1,8 +1,8 @@
 // The JSON half of a run's record, and the configuration in it.
 
-#include "harness/record.h"
+#include "run/record.h"
 #include "fuzz/target.h"
-#include "harness/config.h"
+#include "run/config.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace o2v;

@@ -1,7 +1,7 @@
 // Config files as experiment, as a layer of a run, and as the config.toml of a run.
 
 #include "fuzz/target.h"
-#include "harness/config.h"
+#include "run/config.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace o2v;

@@ -6,7 +6,7 @@
 
 #include "algo/setup.h"
 #include "base/files.h"
-#include "harness/trainer.h"
+#include "run/trainer.h"
 #include "test_folder.h"
 
 namespace o2v {

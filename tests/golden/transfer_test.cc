@@ -6,8 +6,8 @@
 #include <sstream>
 
 #include "env/pairs.h"
-#include "harness/checkpoint.h"
 #include "real_run.h"
+#include "run/checkpoint.h"
 
 namespace o2v {
 namespace {

@@ -13,8 +13,8 @@
 #include "base/csv.h"
 #include "base/files.h"
 #include "env/mujoco_env.h"
-#include "env/replay.h"
 #include "parity/model_dump.h"
+#include "report/replay.h"
 
 namespace o2v {
 
