@@ -105,6 +105,23 @@ toml::table Parse(const ConfigText& file) {
   }
 }
 
+/// A config file and what it says, parsed once.
+struct Document {
+  ConfigText file;
+  toml::table root;
+
+  explicit Document(ConfigText text) : file(std::move(text)), root(Parse(file)) {}
+};
+
+/// The file of this name that is compiled into the program.
+const Document& Embedded(const std::string& name) {
+  static std::map<std::string, Document> documents;
+  const auto found = documents.find(name);
+  return found != documents.end()
+             ? found->second
+             : documents.emplace(name, Document(OpenConfig(name))).first->second;
+}
+
 std::string Origin(const ConfigText& file, const toml::node& node) {
   return Concat(file.name, ":", node.source().begin.line);
 }
@@ -130,7 +147,7 @@ Scalar ReadScalar(const ConfigText& file, std::string_view key, const toml::node
 /// The section's plain keys, then those of the tables in it that hold for `scope`.
 void Flatten(const ConfigText& file, const toml::table* section, const Scope& scope, Table& out) {
   if (!section) return;
-  const auto known =
+  static const auto known =
       Union({kSuites, kFidelities, Ids(AlgorithmRegistry()), Ids(EnvRegistry()), PairNames()});
   for (const auto& [key, node] : *section) {
     if (!node.is_table()) {
@@ -164,9 +181,10 @@ int ReadFormat(const ConfigText& file, const toml::table& root, int last) {
   return static_cast<int>(format);
 }
 
-Layer ReadLayer(const ConfigText& file, const Scope& scope,
+/// What the file says to a run of this scope.
+Layer ReadLayer(const Document& document, const Scope& scope,
                 const std::vector<AddedKey>& added = AddedKeys()) {
-  const toml::table root = Parse(file);
+  const auto& [file, root] = document;
   const std::vector<std::string> sections = {"run", "switches", "algo", "experiment", kFormatKey};
   for (const auto& [key, node] : root) {
     if (!Contains(sections, key.str())) {
@@ -264,26 +282,22 @@ std::string ToWord(std::string_view key, const Scalar& scalar) {
 
 // ---- Runs
 
-/// The switches that the run reads.
-std::vector<std::string> SwitchNames(const RunConfig& config) {
+bool Concerns(const SwitchInfo& info, const std::string& algorithm, bool transfer) {
+  return info.Concerns(algorithm) && (!info.transfer || transfer);
+}
+
+/// The switches that a run reads.
+std::vector<std::string> SwitchNames(const Scope& scope) {
   std::vector<std::string> names;
   for (const SwitchInfo& info : SwitchRegistry()) {
-    if (Concerns(info, config)) names.push_back(info.name);
+    if (Concerns(info, scope.algorithm, !scope.transfer.empty())) names.push_back(info.name);
   }
   return names;
 }
 
-/// A run of these tasks and this method, otherwise empty.
-RunConfig Named(const Scope& scope) {
-  RunConfig config;
-  config.task = scope.tasks;
-  config.algorithm = scope.algorithm;
-  return config;
-}
-
 /// The method's own file, whose keys are the known ones.
 Layer MethodLayer(const Scope& scope) {
-  return ReadLayer(OpenConfig("algo/" + scope.algorithm), scope);
+  return ReadLayer(Embedded("algo/" + scope.algorithm), scope);
 }
 
 void RequireKnown(const Table& table, const std::vector<std::string>& known) {
@@ -300,7 +314,10 @@ RunConfig Build(const Layer& layer, const Scope& scope, const Table& known_hyper
   RequireKnown(layer.hyper, Keys(known_hyper));
   auto need = [&](const char* key) { return Need(layer.run, where, key); };
 
-  RunConfig config = Named(scope);
+  RunConfig config;
+  config.task = scope.tasks;
+  config.algorithm = scope.algorithm;
+  // A conditional table may not override the names that it depends on.
   for (const auto& [key, name] : {std::pair{"task", scope.tasks},
                                   {"algorithm", scope.algorithm},
                                   {"fidelity", scope.fidelity}}) {
@@ -319,7 +336,7 @@ RunConfig Build(const Layer& layer, const Scope& scope, const Table& known_hyper
       static_cast<int>(ToInt("eval_episodes", need("eval_episodes"), 1, kMaxInt));
 
   config.switches = SwitchesFor(config.fidelity);
-  const auto switches = SwitchNames(config);
+  const auto switches = SwitchNames(scope);
   for (const auto& [key, scalar] : layer.switches) {
     if (!Contains(switches, key)) Unknown(scalar.origin, "switch of this run", key, switches);
     try {
@@ -339,7 +356,7 @@ RunConfig Build(const Layer& layer, const Scope& scope, const Table& known_hyper
   return config;
 }
 
-/// Names of one run in its file's [run]; ids are checked here, before they are looked up.
+/// Task, method and fidelity from [run]; unknown ids are refused here.
 Scope CheckedScope(const Table& run, const std::string& where) {
   auto word = [&](const char* key, const char* what, const std::vector<std::string>& known) {
     const Scalar& scalar = Need(run, where, key);
@@ -377,7 +394,7 @@ bool IsResolved(const Table& run) {
 
 /// Completes a resolved configuration of an older format.
 void AddHistory(const std::vector<AddedKey>& added, const Scope& scope, Layer& layer) {
-  const auto switches = SwitchNames(Named(scope));
+  const auto switches = SwitchNames(scope);
   for (const AddedKey& key : added) {
     if (key.since <= layer.format) continue;
     const Scalar value =
@@ -418,7 +435,7 @@ const std::vector<AddedKey>& AddedKeys() {
 }
 
 bool Concerns(const SwitchInfo& info, const RunConfig& config) {
-  return info.Concerns(config.algorithm) && (!info.transfer || SplitTasks(config.task).size() > 1);
+  return Concerns(info, config.algorithm, SplitTasks(config.task).size() > 1);
 }
 
 ConfigText OpenConfig(const std::string& config) {
@@ -460,24 +477,26 @@ RunConfig ResolveRun(const RunRequest& request, const std::vector<AddedKey>& add
   option("seed", "--seed", request.seed);
   option("steps", "--steps", request.steps);
 
-  std::vector<ConfigText> files = {OpenConfig("run")};
-  if (request.config) files.push_back(*request.config);
-  Table names;  // plain keys only: no conditional table can name the run that it depends on
-  for (const ConfigText& file : files) Put(ReadLayer(file, {}, added).run, names);
-  Put(options, names);
-  const Scope scope = CheckedScope(names, kCommandLine);
+  // First the plain keys of [run], by the empty scope: which task, method and fidelity? Only then
+  // is it known which conditional tables hold.
+  const Document& usual = Embedded("run");
+  const auto given = request.config ? std::optional<Document>(*request.config) : std::nullopt;
+  Table plain = ReadLayer(usual, {}).run;
+  if (given) Put(ReadLayer(*given, {}, added).run, plain);
+  Put(options, plain);
+  const Scope scope = CheckedScope(plain, kCommandLine);
 
   const Layer method = MethodLayer(scope);
-  Layer layer = ReadLayer(files[0], scope);
+  Layer layer = ReadLayer(usual, scope);
   Put(method, layer);
-  if (request.config) {
-    Layer own = ReadLayer(files[1], scope, added);
+  if (given) {
+    Layer own = ReadLayer(*given, scope, added);
     if (IsResolved(own.run)) AddHistory(added, scope, own);
     Put(own, layer);
   }
   Put(options, layer.run);
   for (const std::string& assignment : request.set) {
-    ApplySet(assignment, SwitchNames(Named(scope)), method.hyper, layer);
+    ApplySet(assignment, SwitchNames(scope), method.hyper, layer);
   }
   return Build(layer, scope, method.hyper, kCommandLine);
 }
@@ -510,11 +529,11 @@ std::string ToToml(const RunConfig& config, const std::vector<AddedKey>& added) 
 
 RunConfig ParseRunConfig(const std::string& text, const std::string& file_name,
                          const std::vector<AddedKey>& added) {
-  const ConfigText file{file_name, text};
-  const Scope scope = CheckedScope(ReadLayer(file, {}, added).run, file_name);
-  Layer layer = ReadLayer(file, scope, added);
+  const Document document({file_name, text});
+  const Scope scope = CheckedScope(ReadLayer(document, {}, added).run, file_name);
+  Layer layer = ReadLayer(document, scope, added);
   AddHistory(added, scope, layer);
-  for (const std::string& name : SwitchNames(Named(scope))) {
+  for (const std::string& name : SwitchNames(scope)) {
     Need(layer.switches, file_name, name);
   }
   return Build(layer, scope, MethodLayer(scope).hyper, file_name);
