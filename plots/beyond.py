@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from plots.claims import MARGIN, OURS
+from plots.claims import MARGIN, OURS, UNDECIDED, UNMEASURED
 from plots.inputs import Inputs
 from plots.records import FIDELITIES, METHODS, PAIRS, TASKS, Cell
 from plots.samples import Sample, our_samples, persistence
 from plots.statistics import CONFIDENCE, Difference, Moments, holm, one_sample, welch
 from plots.text import interval, moments, number, p_clause
 
-YES, NO, UNDECIDED, UNMEASURED = "yes", "no", "undecided", "unmeasured"
+YES, NO = "yes", "no"
 ALL_TASKS = (*TASKS, *PAIRS)
 USUAL = 4  # options
 LEAST = MARGIN  # effect, relative, that is worth a yes
@@ -34,7 +34,7 @@ class Part:
 class Answer:
     word: str
     small: str = ""  # beside it
-    reason: str = "not measured yet"
+    reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def over_tasks(shown: Callable[[float], str]) -> Callable[[Sequence[Part]], Answ
     def answer(parts: Sequence[Part]) -> Answer:
         effects = [p.effect for p in parts if p.effect is not None]
         if not effects:
-            return Answer(UNMEASURED)
+            return Answer(UNMEASURED, reason="; ".join(dict.fromkeys(p.measured for p in parts)))
         d = one_sample(Moments.of(effects))
         low, high = d.interval
         word = NO if high < LEAST else YES if low > 0 else UNDECIDED  # not where they are NaN
@@ -66,7 +66,7 @@ def over_switches(parts: Sequence[Part]) -> Answer:
     number. It cannot say no."""
     known = [p for p in parts if not math.isnan(p.p)]
     if not known:
-        return Answer(UNMEASURED)
+        return Answer(UNMEASURED, reason="no whole runs with one switch turned")
     sure = [part.name for part, p in zip(known, holm([p.p for p in known]))
             if p < LEVEL and part.effect > 0]
     return Answer(YES if sure else UNDECIDED, f"{len(sure)}/{len(known)}",
@@ -142,7 +142,7 @@ def _above_ppo(inputs: Inputs, fidelity: str) -> list[Part]:
         one = options_of(inputs, fidelity, task).get(1)
         ppo = inputs.sources[fidelity].get((task, "ppo"))
         if one is None or ppo is None or ppo.shortened:
-            parts.append(Part(task, "no whole runs with one option, or none of PPO"))
+            parts.append(Part(task, "no whole runs with one option, or of PPO"))
             continue
         d = welch(one.moments, ppo.moments)
         parts.append(Part(task, f"{moments(one.moments)} with one option, PPO "
@@ -166,7 +166,7 @@ QUESTIONS = (
              f"the fidelity has them. Yes: larger with p < {LEVEL:.2f} (Welch, with Holm's "
              "correction for the number of comparisons). Undecided otherwise.", _switches,
              over_switches),
-    Question("Is it above PPO without options?",
+    Question("With one option, is Option2Vec above PPO?",
              "Return at the end with one option less that of PPO, over the latter. What is left "
              "then is not the options: two stages that train the critic twice, standard deviations "
              f"that depend on the state, ReLU. {RULE}", _above_ppo, over_tasks(_percent)),

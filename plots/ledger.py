@@ -17,8 +17,11 @@ SOURCES = ("authors", "released", "paper")  # columns, in this order
 NAMES = {"authors": "authors' logs", "released": "`released`", "paper": "`paper`"}
 ALL_TASKS = TASKS + tuple(PAIRS)
 GRID = len(FIDELITIES) * len(ALL_TASKS) * len(GRID_METHODS) * len(SEEDS)
-WORDS = {HOLDS: "holds", FAILS: "fails", UNDECIDED: "undecided", UNMEASURED: "unmeasured",
-         APART: "-"}
+SAID = {"released": "the authors' code", "paper": "the text"}
+VERBS = {HOLDS: ("**holds**", "**hold**"), FAILS: ("**fails**", "**fail**"),
+         UNDECIDED: ("is undecided", "are undecided"),
+         UNMEASURED: ("is not measured", "are not measured")}  # of one, of several
+FEW = 3  # tasks that are named one by one
 BEGIN, END = "<!-- results:begin -->", "<!-- results:end -->"
 
 
@@ -30,25 +33,46 @@ class Judged:
     def verdict(self, source: str) -> str:
         return verdict_of(self.claim, self.findings[source])
 
-    def word(self, source: str) -> str:
-        """The verdict in one word; a statement of theory that fails is false."""
-        word = WORDS[self.verdict(source)]
-        return "false" if word == "fails" and self.claim.id == "proposition" else word
-
     def count(self, source: str) -> str:
-        """Of how many parts the claim is literally true, as "4/6"."""
+        """Of how many parts the claim is literally true, of those whose rivals all have runs:
+        "4/6"."""
         known = [f.literal for f in self.findings[source] if f.literal is not None]
         return f"{sum(known)}/{len(known)}" if known and self.claim.literally else ""
 
     def literally(self, source: str) -> str:
         """The same in words, without regard to spread."""
-        count = self.count(source).replace("/", " of ")
-        return self.claim.literally.format(count) if count else ""
+        count, parts = self.count(source), len(self.findings[source])
+        if not count:
+            return ""
+        text = self.claim.literally.format(count.replace("/", " of "))
+        whole = count.endswith(f"/{parts}")
+        return text if whole else f"{text}, the others of {parts} lack runs"
+
+    def deciding(self, source: str) -> list[Finding]:
+        """The parts that the verdict rests on: those with the claim's own verdict, of an undecided
+        claim all that have runs."""
+        verdict = self.verdict(source)
+        return [f for f in self.findings[source]
+                if f.verdict == verdict or (verdict == UNDECIDED and f.n)]
 
     def seeds(self, source: str) -> tuple[int, int] | None:
-        """Least and largest number of seeds that a part rests on."""
-        seeds = [n for f in self.findings[source] for n in f.n]
+        """Least and largest n of the deciding parts."""
+        seeds = [n for f in self.deciding(source) for n in f.n]
         return (min(seeds), max(seeds)) if seeds else None
+
+    def n(self, source: str) -> str:
+        """The same as text: "1-10", with the unit where it is not seeds; where some parts of
+        several decide, which: "2 (Reacher)", "1-5 (4 tasks)"."""
+        seeds = self.seeds(source)
+        if seeds is None:
+            return ""
+        text = "-".join(map(str, sorted(set(seeds)))) + f" {self.claim.unit}".rstrip()
+        parts = [f.part.removesuffix("-v2") for f in self.deciding(source)]
+        if len(parts) == len(self.findings[source]):
+            return text
+        few = self.verdict(source) != UNDECIDED and len(parts) <= FEW
+        count = f"{len(parts)} task{'s' * (len(parts) > 1)}"
+        return f"{text} ({', '.join(parts) if few else count})"
 
     @property
     def heading(self) -> str:
@@ -80,24 +104,21 @@ def done(cells: Mapping[Key, Cell]) -> int:
                if not key.variant and key not in joined for run in cell.runs)
 
 
-def sentence(judged: Sequence[Judged]) -> str:
-    """What held, what failed and what is open. A claim with two verdicts stands where it failed."""
-    held, failed, left = [], [], []
-    for j in judged:
-        words = {s: j.word(s) for s in SOURCES}
-        lost = [NAMES[s] for s in SOURCES if words[s] in ("fails", "false")]
-        known = [w for w in words.values() if w != "-"]
-        if lost:
-            kept = [NAMES[s] for s in SOURCES if words[s] == "holds"]
-            where = ", ".join(lost) + (f"; holds in {', '.join(kept)}" if kept else "")
-            failed.append(j.claim.short + ("" if len(lost) == len(known) else f" ({where})"))
-        elif "holds" in known:
-            held.append(j.claim.short)
-        else:
-            left.append(j.claim.short)
-    parts = [f"**{title}:** {'; '.join(names)}." for title, names in (
-        ("Held", held), ("Failed", failed), ("Undecided", left)) if names]
-    return " ".join(parts)
+def sentences(found: Mapping[str, Any]) -> list[str]:
+    """From claims.json, a sentence on each version: what holds, what fails, how much is open."""
+    lines = []
+    for source in SOURCES[1:]:
+        by_word: dict[str, list[str]] = {}
+        for claim in found["claims"]:
+            by_word.setdefault(claim["verdicts"][source]["word"], []).append(claim["short"])
+        clauses = []
+        for word, verb in VERBS.items():
+            if names := by_word.get(word):
+                listed = f" ({'; '.join(names)})" if word in (HOLDS, FAILS) else ""
+                clauses.append(f"{len(names)} {verb[len(names) > 1]}{listed}")
+        lines.append(f"**{NAMES[source]}**, {SAID[source]}: of {len(found['claims'])} claims "
+                     + ", ".join(clauses) + ".")
+    return lines
 
 
 def claims_json(judged: Sequence[Judged], inputs: Inputs,
@@ -107,9 +128,10 @@ def claims_json(judged: Sequence[Judged], inputs: Inputs,
     return {
         "runs_done": done(inputs.cells), "runs_of_grid": GRID,
         "claims": [{
-            "id": j.claim.id, "claim": j.claim.text, "place": j.claim.place, "report": j.anchor,
-            "verdicts": {s: {"word": j.word(s), "literally": j.literally(s),
-                             "seeds": list(j.seeds(s) or [])} for s in SOURCES}}
+            "id": j.claim.id, "claim": j.claim.text, "short": j.claim.short,
+            "place": j.claim.place, "report": j.anchor,
+            "verdicts": {s: {"word": j.verdict(s), "literally": j.literally(s),
+                             "seeds": list(j.seeds(s) or []), "n": j.n(s)} for s in SOURCES}}
             for j in judged],
         "beyond_the_paper": [{
             "question": q.text, "report": slug(q.text),
@@ -119,34 +141,23 @@ def claims_json(judged: Sequence[Judged], inputs: Inputs,
 
 def box(found: Mapping[str, Any], report: str = "results/REPORT.md") -> str:
     """The table of README.md, from claims.json."""
-    share = 100 * found["runs_done"] / found["runs_of_grid"]
-    words = [claim["verdicts"]["released"]["word"] for claim in found["claims"]]
-    held, lost = words.count("holds"), words.count("fails") + words.count("false")
-    against = "; ".join(claim["claim"] for claim, word in zip(found["claims"], words)
-                        if word in ("fails", "false"))
     runs, grid = found["runs_done"], found["runs_of_grid"]
-    lines = [f"{runs} of the grid's {grid} runs are done ({share:.0f} "
-             f"%). Of {len(words)} claims, `released` confirms {held}, contradicts {lost} and "
-             f"leaves {len(words) - held - lost} open."
-             + (f" Contradicted: {against}." if against else ""), "",
-             "n is the number of seeds behind each verdict, in the order of the columns. Words in "
-             "quotation marks are the paper's.", "",
+    lines = [f"{runs} of the grid's {grid} runs are done ({100 * runs / grid:.0f} %), so far:", "",
+             *(f"- {line}" for line in sentences(found)), "",
+             "n belongs to the columns in their order: the seeds per method and task that the "
+             "verdict rests on, with the tasks where only some decide it. For embeddings it is the "
+             "number of runs, over all tasks. Words in quotation marks are the paper's.", "",
              "| claim of the paper | " + " | ".join(NAMES[s] for s in SOURCES) + " | n |",
              "|---|---|---|---|---|"]
     for claim in found["claims"]:
         verdicts = [claim["verdicts"][s] for s in SOURCES]
-        seeds = " · ".join(_range(v["seeds"]) for v in verdicts)
+        n = " · ".join(v["n"] or "-" for v in verdicts) if any(v["n"] for v in verdicts) else "-"
         lines.append(f"| [{claim['claim']}]({report}#{claim['report']}) | "
-                     + " | ".join(v["word"] for v in verdicts)
-                     + f" | {seeds if seeds.strip('- ·') else '-'} |")
+                     + " | ".join(v["word"] for v in verdicts) + f" | {n} |")
     for q in found["beyond_the_paper"]:
         lines.append(f"| *Ours:* [{q['question']}]({report}#{q['report']}) | - | "
                      + " | ".join(q["answers"][f] for f in SOURCES[1:]) + " | - |")
     return "\n".join(lines)
-
-
-def _range(seeds: Sequence[int]) -> str:
-    return "-".join(map(str, sorted(set(seeds)))) or "-"
 
 
 def put_box(readme: str, text: str) -> str:

@@ -11,8 +11,8 @@ import numpy as np
 
 from plots import (beyond, fig_aggregate, fig_cost, fig_embedding, fig_learning_curves, fig_options,
                    fig_options_count, fig_parameters, fig_transfer, ledger, mine)
-from plots.claims import (AUTHORS_PARAMETERS, CHECKS, FAILS, GRADIENT_BOUND, HOLDS, OURS, UNDECIDED,
-                          UNMEASURED, Finding)
+from plots.claims import (APART, AUTHORS_PARAMETERS, CHECKS, FAILS, GRADIENT_BOUND, HOLDS, OURS,
+                          UNDECIDED, UNMEASURED, Finding)
 from plots.inputs import Inputs
 from plots.ledger import ALL_TASKS, GRID, NAMES, Judged
 from plots.records import (FIDELITIES, GRID_METHODS, METHODS, PAIRS, SEEDS, TASKS, Cell,
@@ -60,7 +60,7 @@ def build(inputs: Inputs) -> tuple[list[Block], list[Drawing], dict]:
 
     options, embedding = drawn(fig_options), drawn(fig_embedding)
     blocks = [
-        Paragraph(ledger.sentence(judged), lead=True),
+        *(Paragraph(sentence, lead=True) for sentence in ledger.sentences(found)),
         _first_screen(judged, answers, cells),
         Heading("All tasks at a glance", short="Glance"), *drawn(fig_aggregate),
         Details("What the words mean: `paper`, `released`, return, ±, n, p", _definitions(cells)),
@@ -106,7 +106,7 @@ def _first_screen(judged: Sequence[Judged], answers: Sequence, cells: Mapping[Ke
     lights = Lights(
         ["claim of the paper", *(NAMES[s] for s in ledger.SOURCES)],
         [(j.claim.text, j.claim.place, j.anchor,
-          [(j.word(s), j.count(s)) for s in ledger.SOURCES]) for j in judged])
+          [(j.verdict(s), _beside(j, s)) for s in ledger.SOURCES]) for j in judged])
     own = Lights(
         ["our own questions", "`released`", "`paper`"],
         [(q.text, "", slug(q.text),
@@ -114,9 +114,16 @@ def _first_screen(judged: Sequence[Judged], answers: Sequence, cells: Mapping[Ke
          for q, parts in answers])
     return Screen(
         [lights, Paragraph("Words in quotation marks are the paper's. 4/6: by mean alone, whatever "
-                           "the spread, it is so on 4 of 6 tasks. Each verdict leads to its "
-                           "evidence.")],
+                           "the spread, it is so on 4 of the 6 tasks where all rivals have runs. "
+                           "n: seeds per method that a verdict rests on. Each verdict leads to "
+                           "its evidence.")],
         [own, _coverage(cells)])
+
+
+def _beside(j: Judged, source: str) -> str:
+    """What stands small behind a verdict; the tasks of n are with the evidence."""
+    n = j.n(source).partition(" (")[0] if j.verdict(source) in (HOLDS, FAILS) else ""
+    return ", ".join(filter(None, [j.count(source), f"n = {n}" if n else ""]))
 
 
 def _coverage(cells: Mapping[Key, Cell]) -> Block:
@@ -130,7 +137,7 @@ def _coverage(cells: Mapping[Key, Cell]) -> Block:
     found, order = ledger.done(cells), ledger.SOURCES[1:]
     return Coverage(
         f"**{found} of {GRID} runs are done ({100 * found / GRID:.0f} %).** "
-        f"Seeds, of {len(SEEDS)}:",
+        f"A number is how many of the {len(SEEDS)} seeds are done:",
         found / GRID, [NAMES[f] for f in order], [METHODS[m] for m in GRID_METHODS],
         [(name(task), [[count(f, task, m) for m in GRID_METHODS] for f in order])
          for task in ALL_TASKS], len(SEEDS))
@@ -176,17 +183,19 @@ def _claims(judged: Sequence[Judged]) -> list[Block]:
     blocks: list[Block] = [Details("How a claim is judged", [Paragraph(
         "Definitions are fixed in `plots/claims.py` before the verdicts. The verdict on a claim, "
         f"and on each of its parts, is \"{HOLDS}\", \"{FAILS}\", \"{UNDECIDED}\" at so many seeds, "
-        f"or \"{UNMEASURED}\". A claim about several tasks holds when it holds on as many as it "
-        "names; it does not hold when that has become impossible. Rivals are DAC+PPO, AHP+PPO, "
-        "PPOC, OC and PPO, which have to be there for a verdict \"holds\" or a comparison with the "
-        "best of them, and DAC-OneStep and IOPG where they have runs. Shortened runs decide "
-        "nothing. Only the paper's main text was available. Its words are in quotation marks where "
-        "we have them; the rest sums them up. The letters of Figure 4 follow the order of the "
-        "questions."),
+        f"or \"{UNMEASURED}\"; \"{APART}\" stands where a source cannot say anything. A claim "
+        "about several tasks holds when it holds on as many as it names, and fails when that has "
+        "become impossible. n is then that of the tasks that decide it, and their names stand "
+        "behind it where they are few. Rivals are DAC+PPO, AHP+PPO, PPOC, OC and PPO, and "
+        "DAC-OneStep and IOPG where they have runs. While one of the first five has no runs on a "
+        "task, nothing holds there, no rival counts as the best, and the means are not counted. "
+        "Shortened runs decide nothing. Only the paper's main text was available. Its words are in "
+        "quotation marks where we have them; the rest sums them up. The letters of Figure 4 follow "
+        "the order of the questions."),
         Paragraph(
         f"Multiplicity: {tests} parts are tests, each at 5 % and uncorrected. \"Holds\" "
-        "needs every one of several tests, which makes it harder than 5 %; \"does not "
-        "hold\" needs one shortfall among them, so that some would appear by chance "
+        "needs every one of several tests, which makes it harder than 5 %; \"fails\" "
+        "needs one shortfall among them, so that some would appear by chance "
         "where methods are equal, though rarely where the claim is true. The authors' "
         "Option2Vec runs share initial weights and environment seeds on all single tasks "
         "but HalfCheetah and Swimmer: their p are too small.")])]
@@ -211,24 +220,26 @@ def _parts(j: Judged) -> list[Block]:
 def _summary(j: Judged, source: str) -> str:
     """The literal verdict and the statistical one, and the parts that fail, if they are few."""
     findings, verdict = j.findings[source], j.verdict(source)
-    seeds = j.seeds(source)
-    at = f" at n = {'-'.join(map(str, sorted(set(seeds))))}" if seeds else ""
-    reasons = list(dict.fromkeys(f.measured for f in findings))
-    if len(reasons) == 1 or verdict == UNMEASURED:
-        return f"**{verdict}**{at}: {'; '.join(reasons)}"
-    counts = {text: sum(f.verdict == v for f in findings) for v, text in (
-        (HOLDS, "holds on"), (FAILS, "does not hold on"), (UNDECIDED, "undecided on"),
-        (UNMEASURED, "not measured on"))}
+    n = j.n(source)
+    at = f" at n = {n}" if n else ""
+    reasons = "; ".join(dict.fromkeys(f.measured for f in findings))
+    if verdict == APART:
+        return f"{APART} ({reasons})"
+    if len(findings) == 1 or verdict == UNMEASURED:
+        return f"**{verdict}**{at}: {reasons}"
+    counts = {v: sum(f.verdict == v for f in findings)
+              for v in (HOLDS, FAILS, UNDECIDED, UNMEASURED)}
     literal = j.literally(source)
     failed = [f"{f.part} {f.measured}" for f in findings if f.verdict == FAILS]
     return ((f"{literal}; " if literal else "") + f"**{verdict}**{at}: "
-            + ", ".join(f"{text} {n}" for text, n in counts.items() if n)
+            + ", ".join(f"{v} on {count}" for v, count in counts.items() if count)
             + (f" ({'; '.join(failed)})" if 0 < len(failed) <= FEW else ""))
 
 
 def _finding(finding: Finding) -> str:
     seeds = f" (n = {', '.join(map(str, finding.n))})" if finding.n else ""
-    return f"{finding.verdict}: {finding.measured}{seeds}"
+    text = f"{finding.measured}{seeds}"
+    return f"{APART} ({text})" if finding.verdict == APART else f"{finding.verdict}: {text}"
 
 
 def _own_checks(judged: Sequence[Judged]) -> list[Block]:

@@ -273,9 +273,8 @@ for (const wide of document.querySelectorAll(".wide"))
 
 FULL_WIDTH = 600  # [pt] of a figure; narrower ones do not fill the page
 SHORT = 36  # characters of a cell that stay on one line
-CLASSES = {"holds": "holds", "yes": "holds", "does not hold": "fails", "fails": "fails",
-           "false": "fails", "no": "fails", "undecided": "open", "not measured": "open",
-           "unmeasured": "open", "does not apply": "open", "-": "open"}
+CLASSES = {"holds": "holds", "yes": "holds", "fails": "fails", "no": "fails", "undecided": "open",
+           "not measured": "open", "-": "open"}
 
 
 def to_html(title: str, blocks: Sequence[Block]) -> str:

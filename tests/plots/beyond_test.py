@@ -3,7 +3,8 @@ import unittest
 from pathlib import Path
 
 from plots import beyond, fig_options_count
-from plots.beyond import NO, UNDECIDED, UNMEASURED, YES, Part
+from plots.beyond import NO, YES, Part
+from plots.claims import UNDECIDED, UNMEASURED
 from plots.inputs import Inputs
 from plots.records import load_cells
 from plots.samples import persistence
@@ -28,10 +29,13 @@ class AnswerTest(unittest.TestCase):
         self.assertEqual(self.answer(0.01, 0.02, 0.03).word, NO)
         self.assertEqual(self.answer(-0.5, -0.6, -0.4).word, NO)
 
-    def test_undecided_and_unmeasured(self):
+    def test_undecided_and_not_measured(self):
         self.assertEqual(self.answer(0.9, -0.5, 0.6).word, UNDECIDED)
         self.assertEqual(self.answer(0.9).word, UNDECIDED)
         self.assertEqual(self.answer(None).word, UNMEASURED)
+        question = beyond.QUESTIONS[0]
+        parts = [Part(task, "no whole runs with one option") for task in ("a", "b")]
+        self.assertEqual(question.answer(parts).reason, "no whole runs with one option")
 
     def test_switches_are_corrected_for_their_number(self):
         # Holm: 0.02 times 2 is below 0.05, 0.02 times 3 is not.
@@ -87,7 +91,7 @@ class QuestionsTest(unittest.TestCase):
     def test_one_option_against_ppo(self):
         self.write(1, [120, 120])
         write_flat(self.results, TASK, "ppo", [80, 120])
-        parts, _ = self.parts("Is it above PPO")
+        parts, _ = self.parts("With one option")
         self.assertAlmostEqual(parts[TASK].effect, 0.2)
 
     def test_persistence_is_the_duration_over_that_of_independent_draws(self):

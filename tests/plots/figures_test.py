@@ -252,12 +252,14 @@ class ParametersTest(unittest.TestCase):
 
 
 class RotationsTest(unittest.TestCase):
+    PATH = Path("paper/Hopper-v2/option2vec/seed-000.csv")
+
     def test_p_counts_the_measured_one_among_the_rotated_and_is_never_0(self):
         # Every dimension moves one action alone: the share is 1, which no rotation reaches.
         effects = np.zeros((12, 3))
         effects[np.arange(12), np.arange(12) % 3] = 2
         claim, = (c for c in CLAIMS if c.id == "q4")
-        finding, = claim.judge(Evidence("paper", {}, effects={Path("a"): effects}))
+        finding, = claim.judge(Evidence("paper", {}, effects={self.PATH: effects}))
         self.assertEqual(ROTATIONS, 1000)
         self.assertTrue(finding.measured.endswith(f"p = {1 / 1001:.2g}"), finding.measured)
         self.assertTrue(finding.measured.startswith("100 % of the effect"), finding.measured)
@@ -269,7 +271,7 @@ class RotationsTest(unittest.TestCase):
         rotations = np.array([np.eye(2)] * 250 + [turned] * 750)
         claim, = (c for c in CLAIMS if c.id == "q4")
         with mock.patch("plots.claims.stats.ortho_group.rvs", return_value=rotations):
-            finding, = claim.judge(Evidence("paper", {}, effects={Path("a"): 2 * np.eye(2)}))
+            finding, = claim.judge(Evidence("paper", {}, effects={self.PATH: 2 * np.eye(2)}))
         self.assertEqual(finding.measured, "100 % of the effect on primary actions, after rotation "
                          "62 %, p = 0.25")
 

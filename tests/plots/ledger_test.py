@@ -1,4 +1,5 @@
 import unittest
+from dataclasses import replace
 
 from plots import ledger
 from plots.claims import APART, CLAIMS, FAILS, HOLDS, UNDECIDED, UNMEASURED, Finding
@@ -14,28 +15,53 @@ def judged(id: str, **verdicts: str) -> Judged:
 
 class LedgerTest(unittest.TestCase):
     def test_words(self):
-        for verdict, word in ((HOLDS, "holds"), (FAILS, "fails"), (UNDECIDED, "undecided"),
-                              (UNMEASURED, "unmeasured"), (APART, "-")):
-            self.assertEqual(judged("q3", paper=verdict).word("paper"), word)
-        self.assertEqual(judged("proposition", paper=FAILS).word("paper"), "false")
+        self.assertEqual((HOLDS, FAILS, UNDECIDED, UNMEASURED, APART),
+                         ("holds", "fails", "undecided", "not measured", "-"))
+        for verdict in (HOLDS, FAILS, UNDECIDED, UNMEASURED, APART):
+            self.assertEqual(judged("q3", paper=verdict).verdict("paper"), verdict)
 
     def test_count_and_seeds(self):
         j = judged("q3", paper=UNDECIDED)
-        self.assertEqual((j.count("paper"), j.literally("paper"), j.seeds("paper")),
-                         ("5/5", "first by mean on 5 of 5", (3, 5)))
+        self.assertEqual((j.count("paper"), j.literally("paper"), j.n("paper")),
+                         ("5/5", "first by mean on 5 of 5", "3-5"))
 
-    def test_the_sentence_says_what_held_what_failed_and_where(self):
-        text = ledger.sentence([
-            judged("theory", authors=APART, released=HOLDS, paper=HOLDS),
-            judged("q1", authors=UNMEASURED, released=HOLDS, paper=UNDECIDED),
-            judged("q3", authors=HOLDS, released=FAILS, paper=FAILS),
-            judged("proposition", authors=APART, released=FAILS, paper=FAILS),
-            judged("q5", authors=UNMEASURED, released=UNDECIDED, paper=UNMEASURED)])
-        self.assertEqual(
-            text, "**Held:** the theorems and propositions in the sense that is true; Option2Vec "
-            "above DAC-OneStep. **Failed:** first on five of six pairs (`released`, `paper`; holds in "
-            "authors' logs); "
-            "Proposition 3.2 as printed. **Undecided:** growing option durations.")
+    def test_tasks_that_lack_rivals_are_not_counted(self):
+        claim, = (c for c in CLAIMS if c.id == "q3")
+        known = [Finding(str(i), UNDECIDED, "", (3, 3), i > 0) for i in range(3)]
+        j = Judged(claim, {"paper": known + [Finding("x", UNDECIDED, "", (3, 3))]})
+        self.assertEqual((j.count("paper"), j.literally("paper")),
+                         ("2/3", "first by mean on 2 of 3, the others of 4 lack runs"))
+
+    def test_n_is_that_of_the_parts_that_decide(self):
+        claim, = (c for c in CLAIMS if c.id == "q5")
+
+        def n(*parts: Finding) -> str:
+            rest = [Finding("-", UNMEASURED, "")] * (10 - len(parts))
+            return Judged(claim, {"paper": [*parts, *rest]}).n("paper")
+
+        open_ = Finding("Ant-v2", UNDECIDED, "", (10,))
+        lost = [Finding(f"{task}-v2", FAILS, "", (seeds,)) for task, seeds in (
+            ("Reacher", 2), ("Hopper", 3), ("Swimmer", 5), ("Walker2d", 4))]
+        self.assertEqual(n(open_, lost[0]), "2 (Reacher)")
+        self.assertEqual(n(open_, *lost[:2]), "2-3 (Reacher, Hopper)")
+        self.assertEqual(n(open_, *lost), "2-5 (4 tasks)")
+        self.assertEqual(n(open_, replace(open_, part="Swimmer-v2", n=(1,))), "1-10 (2 tasks)")
+        self.assertEqual(n(), "")
+        embeddings, = (c for c in CLAIMS if c.id == "q4")
+        self.assertEqual(Judged(embeddings, {"paper": [Finding("embedding", FAILS, "", (15,))]})
+                         .n("paper"), "15 runs")
+
+    def test_a_sentence_for_each_version_says_what_holds_and_what_fails(self):
+        claims = [{"short": short, "verdicts": {"released": {"word": released},
+                                                "paper": {"word": paper}}}
+                  for short, released, paper in (("a", HOLDS, HOLDS), ("b", HOLDS, FAILS),
+                                                 ("c", FAILS, FAILS), ("d", UNDECIDED, FAILS),
+                                                 ("e", UNDECIDED, UNMEASURED))]
+        self.assertEqual(ledger.sentences({"claims": claims}), [
+            "**`released`**, the authors' code: of 5 claims 2 **hold** (a; b), 1 **fails** (c), "
+            "2 are undecided.",
+            "**`paper`**, the text: of 5 claims 1 **holds** (a), 3 **fail** (b; c; d), 1 is not "
+            "measured."])
 
     def test_anchors_are_the_same_for_good(self):
         anchors = [Judged(c, {}).anchor for c in CLAIMS]
@@ -53,22 +79,22 @@ class LedgerTest(unittest.TestCase):
                 ledger.put_box(broken, "new")
 
     def test_a_line_of_the_box(self):
-        verdicts = {s: {"word": word, "literally": "", "seeds": seeds} for s, word, seeds in (
-            ("authors", "unmeasured", []), ("released", "holds", [3, 10]),
-            ("paper", "fails", [5, 5]))}
-        found = {"runs_done": 640, "runs_of_grid": 2560, "beyond_the_paper": [
-            {"question": "Why?", "report": "why", "answers": {"released": "yes", "paper": "no"}}],
-            "claims": [{"claim": "C", "report": "c", "verdicts": verdicts}]}
-        lost = {"claim": "D", "report": "d", "verdicts": verdicts | {
-            "released": {"word": "false", "literally": "", "seeds": [3]}}}
+        verdicts = {s: {"word": word, "literally": "", "seeds": [], "n": n} for s, word, n in (
+            ("authors", UNMEASURED, ""), ("released", HOLDS, "3-10"), ("paper", FAILS, "2 (Ant)"))}
+        claim = {"claim": "C", "short": "c", "report": "c", "verdicts": verdicts}
+        found = {"runs_done": 640, "runs_of_grid": 2560, "claims": [claim], "beyond_the_paper": [
+            {"question": "Why?", "report": "why", "answers": {"released": "yes", "paper": "no"}}]}
         lines = ledger.box(found).splitlines()
-        self.assertEqual(lines[0], "640 of the grid's 2560 runs are done (25 %). Of 1 claims, "
-                         "`released` confirms 1, contradicts 0 and leaves 0 open.")
-        both = found | {"claims": [lost, *found["claims"], lost | {"claim": "E"}]}
-        self.assertIn("contradicts 2 and leaves 0 open. Contradicted: D; E.\n", ledger.box(both))
+        self.assertEqual(lines[:4], [
+            "640 of the grid's 2560 runs are done (25 %), so far:", "",
+            "- **`released`**, the authors' code: of 1 claims 1 **holds** (c).",
+            "- **`paper`**, the text: of 1 claims 1 **fails** (c)."])
         self.assertEqual(lines[-2:], [
-            "| [C](results/REPORT.md#c) | unmeasured | holds | fails | - · 3-10 · 5 |",
+            "| [C](results/REPORT.md#c) | not measured | holds | fails | - · 3-10 · 2 (Ant) |",
             "| *Ours:* [Why?](results/REPORT.md#why) | - | yes | no | - |"])
+        for verdict in verdicts.values():
+            verdict["n"] = ""
+        self.assertTrue(ledger.box(found).splitlines()[-2].endswith("| fails | - |"))
 
 
 if __name__ == "__main__":

@@ -208,18 +208,18 @@ class ReportTest(unittest.TestCase):
     def test_the_first_screen_has_a_word_for_each_claim_and_source(self):
         row = self.row('Best on the four "infinite horizon" tasks')
         place = "#best-on-the-four-infinite-horizon-tasks-q2-fig-4b"
-        self.assertEqual(row[1:], [f"[fails]({place}) 3/4", f"[unmeasured]({place})",
-                                   f"[undecided]({place}) 1/1"])
-        self.assertEqual(self.row("As printed")[1:3], ["-", "[unmeasured](#as-printed-varv_bar--v-"
-                                                      "proposition-32)"])
+        self.assertEqual(row[1:], [f"[fails]({place}) 3/4, n = 10", f"[not measured]({place})",
+                                   f"[undecided]({place})"])  # only PPO of the rivals has runs
+        self.assertEqual(self.row("As printed")[1:3], [
+            "-", "[not measured](#as-printed-varv_bar--v-proposition-32)"])
         self.assertEqual(len(self.rows("Does Option2Vec need options?")), 1)
 
     def test_the_evidence_has_the_literal_verdict_beside_the_statistical_one(self):
         text = self.files["REPORT.md"]
-        self.assertIn("- `paper`: first by mean on 1 of 1; **undecided** at n = 3: undecided on 1, "
-                      "not measured on 3", text)
-        self.assertIn("- authors' logs: first by mean on 3 of 4; **does not hold** at n = 10: "
-                      "holds on 3, does not hold on 1 (Reacher-v2 -0.944 [-1.741, -0.146] against "
+        self.assertIn("- `paper`: **undecided** at n = 3 (1 task): undecided on 1, not measured "
+                      "on 3", text)
+        self.assertIn("- authors' logs: first by mean on 3 of 4; **fails** at n = 10 (Reacher): "
+                      "holds on 3, fails on 1 (Reacher-v2 -0.944 [-1.741, -0.146] against "
                       "PPO, p = 0.023)", text)
 
     def test_every_link_of_the_text_leads_to_a_heading(self):
@@ -234,7 +234,8 @@ class ReportTest(unittest.TestCase):
         self.assertEqual((found["runs_done"], found["runs_of_grid"]), (14, 2560))
         claim, = (c for c in found["claims"] if c["id"] == "q2-best")
         self.assertEqual(claim["verdicts"]["authors"], {
-            "word": "fails", "literally": "first by mean on 3 of 4", "seeds": [10, 10]})
+            "word": "fails", "literally": "first by mean on 3 of 4", "seeds": [10, 10],
+            "n": "10 (Reacher)"})
         self.assertEqual(claim["verdicts"]["paper"]["seeds"], [3, 3])
 
     def test_missing_runs_are_named(self):
