@@ -477,7 +477,7 @@ CLAIMS = (
           "tolerance or, of a reading that is marked false, beyond it. Which readings are false is "
           "in the table of the theory.", 4, _theory),
     Claim("q4", "Q4, Fig. 6", "Embeddings are interpretable",
-          "interpretable embeddings", "above the mean rotation in {}",
+          "interpretable embeddings", "",
           "Share of the effect of the embedding's dimensions on the mean action that falls on each "
           "dimension's primary action, mean over runs on tasks with several actions: larger than "
           f"in {100 * CONFIDENCE:.0f} % of random rotations of the embedding space. It fails when "
