@@ -124,7 +124,8 @@ def _lasts(inputs: Inputs, fidelity: str) -> list[Part]:
 def _switches(inputs: Inputs, fidelity: str) -> list[Part]:
     parts = []
     for key, cell in inputs.cells.items():
-        if not key.variant.startswith("o2v_") or (key.fidelity, key.algorithm) != (fidelity, OURS):
+        one = key.variant.startswith("o2v_") and key.variant.count("=") == 1
+        if not one or (key.fidelity, key.algorithm) != (fidelity, OURS):
             continue
         base = inputs.cells.get(key._replace(variant=""))
         x, y = (_persistences(c, cell.wanted) for c in (cell, base))

@@ -400,7 +400,7 @@ FIRST = ("Option2Vec's mean is above that of every rival with p < 0.05 each (Wel
 
 CLAIMS = (
     Claim("q1", "Q1, Fig. 4a", "Option2Vec is above DAC-OneStep on all ten tasks",
-          "Option2Vec above DAC-OneStep", "above by mean on {}",
+          "above DAC-OneStep", "above by mean on {}",
           "Return at 1M steps; above: larger mean and p < 0.05 (Welch, two-sided); it fails on "
           "a task where it is below with p < 0.05.",
           10, _each(TASKS, _above("dac_onestep"))),
@@ -448,12 +448,12 @@ CLAIMS = (
           "The same with hidden layers of 128, as in the authors' later scripts.",
           1, _parameters(128)),
     Claim("option-size", "text", "An option costs 40 parameters, in DAC \"19K parameters\"",
-          "40 parameters an option against 19K", "true of {}",
+          "40 parameters an option", "true of {}",
           "S = 17, A = 6, K = 4. An option's embedding has 40 parameters; one more option adds no "
           "others; an action policy of DAC+PPO has 19 thousand at DAC's own width of 64.",
           3, _an_option),
     Claim("cost", "text", "At \"significantly less computational cost\", on the two tasks timed",
-          "less computational cost", "less than DAC+PPO on {}",
+          "lower cost", "less than DAC+PPO on {}",
           "CPU time of the learner per environment step, inference and learning, as `make bench` "
           f"measured it on two tasks: at most {100 * CHEAPER:.0f} % of that of DAC+PPO on both. It "
           "fails where it is more. Physics is left out: it is the same for both methods, and the "
@@ -472,7 +472,7 @@ CLAIMS = (
           "False when `make theory` finds processes for which it is not so. The sides have "
           "different units: rewards times c scale them by c^2 and c.", 1, _as_printed),
     Claim("theory", "3.1 to 3.4", "Propositions and theorems in the sense that is true",
-          "the theorems and propositions in the sense that is true", "",
+          "the theory in the sense that is true", "",
           "Every check of `make theory` on a statement comes out as said: its gap is within "
           "tolerance or, of a reading that is marked false, beyond it. Which readings are false is "
           "in the table of the theory.", 4, _theory),
@@ -485,7 +485,7 @@ CLAIMS = (
           f"{100 * ALIGNED:.0f} percentage points. n is the number of runs, over all tasks.",
           1, _interpretable, "runs"),
     Claim("q5", "Q5, Fig. 7", "Option durations grow, on all ten tasks",
-          "growing option durations", "longer by mean on {}",
+          "growing durations", "longer by mean on {}",
           "Mean duration of an option (steps by executions, all options together; the end of an "
           "episode ends an execution, so that durations grow with episodes, too) in the last "
           "tenth of the steps less that in the first: positive with p < 0.05 (t, paired by run); "

@@ -137,7 +137,7 @@ def _coverage(cells: Mapping[Key, Cell]) -> Block:
     found, order = ledger.done(cells), ledger.SOURCES[1:]
     return Coverage(
         f"**{found} of {GRID} runs are done ({100 * found / GRID:.0f} %).** "
-        f"A number is how many of the {len(SEEDS)} seeds are done:",
+        f"Below: seeds done, at most {len(SEEDS)}.",
         found / GRID, [NAMES[f] for f in order], [METHODS[m] for m in GRID_METHODS],
         [(name(task), [[count(f, task, m) for m in GRID_METHODS] for f in order])
          for task in ALL_TASKS], len(SEEDS))

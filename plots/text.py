@@ -199,7 +199,7 @@ nav { position: sticky; top: 0; z-index: 3; display: flex; gap: 1.1rem; overflow
 nav a { text-decoration: none; }
 nav a:hover { text-decoration: underline; }
 p { max-width: 62rem; }
-.lead { margin: .3rem 0 .7rem; max-width: none; font-size: .88rem; line-height: 1.4; }
+.lead { margin: .25rem 0 .4rem; max-width: none; font-size: .88rem; line-height: 1.4; }
 .screen { display: grid; grid-template-columns: minmax(0, 1fr); gap: 0 1.6rem; }
 @media (min-width: 64rem) { .screen { grid-template-columns: minmax(0, 47.5rem) minmax(0, 1fr); } }
 .screen p { font-size: .85rem; line-height: 1.4; margin: .5rem 0; }
@@ -241,7 +241,9 @@ tbody td:first-child { position: sticky; left: 0; background: var(--paper); }
   .lights { font-size: .74rem; }
   .lights th, .lights td { padding: .17rem .2rem; }
   .lights tbody td:first-child { min-width: 0; max-width: none; }
-  .lights td small { display: none; } }
+  .lights td small { display: block; }
+  html { scroll-padding-top: 5.5rem; }
+  nav { flex-wrap: wrap; gap: .1rem .8rem; font-size: .8rem; } }
 code { background: var(--soft); padding: 0 .2em; border-radius: .2em; }
 .holds { color: var(--good); }
 .fails { color: var(--bad); }

@@ -34,7 +34,8 @@ struct GridOptions {
     app.add_option("--tasks", query.tasks,
                    "A,B instead of the experiment's; with several experiments: the tasks to take")
         ->delimiter(',');
-    app.add_option("--algos", query.algorithms, "methods instead of the experiment's")
+    app.add_option("--algos", query.algorithms,
+                   "methods instead of the experiment's; of an ablation: the methods to take")
         ->delimiter(',');
     app.add_option("--fidelity", query.fidelities, "fidelities instead of the experiment's")
         ->delimiter(',');

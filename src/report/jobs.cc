@@ -31,6 +31,25 @@ std::string Quoted(const std::string& word) {
   return text + "'";
 }
 
+/// What an ablation sets in the run, as --set takes it; nothing if it does not concern the method.
+std::vector<std::string> SettingsOf(const std::vector<std::string>& ablation,
+                                    const RunConfig& config) {
+  const Switches other =
+      SwitchesFor(config.fidelity == Fidelity::kPaper ? Fidelity::kReleased : Fidelity::kPaper);
+  std::vector<std::string> settings;
+  for (const std::string& change : ablation) {
+    const std::string key = change.substr(0, change.find('='));
+    if (!Takes(config, key)) return {};
+    if (change == key) {
+      const auto info = std::ranges::find(SwitchRegistry(), key, &SwitchInfo::name);
+      settings.push_back(Concat(key, "=", SwitchValue(other, *info)));
+    } else {
+      settings.push_back(change);
+    }
+  }
+  return settings;
+}
+
 /// Marks a run that is finished, by its record: the folder may be on another machine.
 void MarkFinished(const std::vector<AddedKey>& added, Job& job) {
   try {
@@ -48,29 +67,34 @@ void MarkFinished(const std::vector<AddedKey>& added, Job& job) {
 
 std::vector<Job> ListJobs(const JobQuery& query) {
   std::vector<ConfigText> files;
-  std::vector<Experiment> experiments;
+  std::vector<std::pair<std::size_t, Experiment>> experiments;  // with the place of its file
   std::size_t most_seeds = 0;
   std::set<std::string> taken;
   for (const std::string& config : query.configs) {
     files.push_back(OpenConfig(config));
-    Experiment experiment = ReadExperiment(files.back());
+    for (Experiment& experiment : ReadExperiments(files.back())) {
+      experiments.push_back({files.size() - 1, std::move(experiment)});
+    }
+  }
+  for (auto& [file, x] : experiments) {
     if (!query.tasks.empty()) {
       std::vector<std::string> tasks;
       for (const std::string& task : query.tasks) {
-        const auto& own = experiment.tasks;
-        if (query.configs.size() > 1 && std::find(own.begin(), own.end(), task) == own.end()) {
-          continue;
-        }
+        if (experiments.size() > 1 && std::ranges::count(x.tasks, task) == 0) continue;
         tasks.push_back(task);
         taken.insert(task);
       }
-      experiment.tasks = tasks;
+      x.tasks = tasks;
     }
-    if (!query.algorithms.empty()) experiment.algorithms = query.algorithms;
-    if (!query.fidelities.empty()) experiment.fidelities = query.fidelities;
-    if (!query.seeds.empty()) experiment.seeds = query.seeds;
-    most_seeds = std::max(most_seeds, experiment.seeds.size());
-    experiments.push_back(std::move(experiment));
+    if (!query.algorithms.empty() && x.ablations.empty()) x.algorithms = query.algorithms;
+    if (!query.algorithms.empty()) {
+      std::erase_if(x.algorithms, [&](const std::string& algorithm) {
+        return std::ranges::count(query.algorithms, algorithm) == 0;
+      });
+    }
+    if (!query.fidelities.empty()) x.fidelities = query.fidelities;
+    if (!query.seeds.empty()) x.seeds = query.seeds;
+    most_seeds = std::max(most_seeds, x.seeds.size());
   }
   for (const std::string& task : query.tasks) {
     if (!taken.contains(task)) {
@@ -79,11 +103,11 @@ std::vector<Job> ListJobs(const JobQuery& query) {
   }
 
   std::vector<Job> jobs;
-  // `flip`: a switch to turn, or null.
-  auto add = [&](std::size_t e, const std::string& fidelity, const SwitchInfo* flip,
-                 const std::string& task, const std::string& algorithm, std::uint64_t seed) {
+  auto add = [&](std::size_t file, const std::string& name, const std::string& fidelity,
+                 const std::vector<std::string>& ablation, const std::string& task,
+                 const std::string& algorithm, std::uint64_t seed) {
     RunRequest request;
-    request.config = files[e];
+    request.config = files[file];
     request.fidelity = fidelity;
     request.task = task;
     request.algorithm = algorithm;
@@ -91,40 +115,33 @@ std::vector<Job> ListJobs(const JobQuery& query) {
     Job job;
     job.config = ResolveRun(request);
     std::string variant = fidelity, set;
-    if (flip) {
-      if (!Concerns(*flip, job.config)) return;
-      const Fidelity other =
-          job.config.fidelity == Fidelity::kPaper ? Fidelity::kReleased : Fidelity::kPaper;
-      const std::string setting = Concat(flip->name, "=", SwitchValue(SwitchesFor(other), *flip));
-      request.set = {setting};
+    if (!ablation.empty()) {
+      request.set = SettingsOf(ablation, job.config);
+      if (request.set.empty()) return;
       job.config = ResolveRun(request);
-      variant += "-" + setting;
-      set = " --set " + Quoted(setting);
+      for (const std::string& setting : request.set) {
+        variant += "-" + setting;
+        set += " --set " + Quoted(setting);
+      }
     }
-    job.dir = query.results / experiments[e].name / variant / task / algorithm / SeedFolder(seed);
+    job.dir = query.results / name / variant / task / algorithm / SeedFolder(seed);
     job.command =
-        Concat(Quoted(query.program), " train --config ", Quoted(query.configs[e]), " --task ",
+        Concat(Quoted(query.program), " train --config ", Quoted(query.configs[file]), " --task ",
                task, " --algo ", algorithm, " --fidelity ", fidelity, set, " --seed ", seed,
                " --steps ", job.config.steps, " --out ", Quoted(job.dir.string()), " --resume");
     MarkFinished(query.added, job);
     jobs.push_back(std::move(job));
   };
   for (std::size_t i = 0; i < most_seeds; ++i) {
-    for (std::size_t e = 0; e < experiments.size(); ++e) {
-      const Experiment& x = experiments[e];
+    for (const auto& [file, x] : experiments) {
       if (i >= x.seeds.size()) continue;
-      std::vector<const SwitchInfo*> ablations;
-      for (const SwitchInfo& info : SwitchRegistry()) {
-        if (std::find(x.ablations.begin(), x.ablations.end(), info.name) != x.ablations.end()) {
-          ablations.push_back(&info);
-        }
-      }
-      if (x.ablations.empty()) ablations.push_back(nullptr);
+      auto ablations = x.ablations;
+      if (ablations.empty()) ablations.emplace_back();
       for (const std::string& fidelity : x.fidelities) {
-        for (const SwitchInfo* flip : ablations) {
+        for (const auto& ablation : ablations) {
           for (const std::string& task : x.tasks) {
             for (const std::string& algorithm : x.algorithms) {
-              add(e, fidelity, flip, task, algorithm, x.seeds[i]);
+              add(file, x.name, fidelity, ablation, task, algorithm, x.seeds[i]);
             }
           }
         }

@@ -12,8 +12,8 @@
 
 namespace o2v {
 
-/// What to list. A list that is not empty replaces the experiments' own; of `tasks`, several
-/// experiments take only those that they have themselves.
+/// What to list. A list that is not empty replaces the experiments' own. But several experiments
+/// take only `tasks`, and those with ablations only `algorithms`, that they have themselves.
 struct JobQuery {
   std::string program = "option2vec";  // first word of the commands
   std::vector<std::string> configs;    // experiments, see OpenConfig
@@ -26,8 +26,8 @@ struct JobQuery {
 /// One run.
 struct Job {
   RunConfig config;
-  std::filesystem::path dir;  // <results>/<experiment>/<fidelity>/<task>/<algorithm>/seed-003; with
-                              // a flip <fidelity>-<switch>=<value>
+  std::filesystem::path dir;  // <results>/<experiment>/<fidelity>/<task>/<algorithm>/seed-003; of
+                              // an ablation <fidelity>-<key>=<value>
   std::string command;        // for a shell: starts the run, or goes on with an unfinished one
   std::optional<RunStatus> finished;  // done or diverged: nothing is left to do
   bool old = false;                   // finished by an older revision of the method's code

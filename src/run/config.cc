@@ -426,6 +426,76 @@ void ApplySet(const std::string& assignment, const std::vector<std::string>& swi
   }
 }
 
+/// Keys that a setting of the experiment may have: switches and its methods' numbers.
+std::vector<std::string> AblationKeys(const Experiment& experiment) {
+  std::vector<std::string> keys;
+  for (const SwitchInfo& info : SwitchRegistry()) keys.push_back(info.name);
+  for (const std::string& algorithm : experiment.algorithms) {
+    for (const std::string& fidelity : experiment.fidelities) {
+      keys = Union({keys, Keys(MethodLayer({fidelity, algorithm, "", "", "", ""}).hyper)});
+    }
+  }
+  return keys;
+}
+
+Experiment ReadExperiment(const ConfigText& file, const toml::table& section) {
+  const std::vector<std::string> known = {"tasks", "algorithms", "fidelities", "seeds",
+                                          "ablations"};
+  for (const auto& [key, node] : section) {
+    if (!Contains(known, key.str())) Unknown(Origin(file, node), "key", key.str(), known);
+  }
+  auto items = [&](const char* key, const toml::node* node) -> const toml::array& {
+    if (!node) throw ConfigError(Concat(file.name, ": missing key '", key, "' in [experiment]"));
+    const toml::array* list = node->as_array();
+    if (!list || list->empty()) {
+      throw ConfigError(Concat(Origin(file, *node), ": '", key, "' must be a non-empty list"));
+    }
+    return *list;
+  };
+  auto read = [&](const char* key, auto&& take) {
+    for (const toml::node& item : items(key, section.get(key))) take(ReadScalar(file, key, item));
+  };
+  const auto tasks = Union({Ids(EnvRegistry()), PairNames()});
+  auto read_words = [&](const char* key, std::vector<std::string>& out,
+                        const std::vector<std::string>& ids) {
+    read(key, [&](const Scalar& scalar) {
+      out.push_back(ToWord(key, scalar));
+      if (!Contains(ids, out.back())) Unknown(scalar.origin, "name", out.back(), ids);
+    });
+  };
+  Experiment experiment;
+  experiment.name = std::filesystem::path(file.name).stem();
+  read_words("tasks", experiment.tasks, tasks);
+  read_words("algorithms", experiment.algorithms, Ids(AlgorithmRegistry()));
+  read_words("fidelities", experiment.fidelities, kFidelities);
+  read("seeds", [&](const Scalar& scalar) {
+    experiment.seeds.push_back(static_cast<std::uint64_t>(ToInt("seeds", scalar, 0)));
+  });
+  if (section.contains("ablations")) {
+    std::vector<std::string> switches;
+    for (const SwitchInfo& info : SwitchRegistry()) {
+      if (!info.flag) switches.push_back(info.name);  // a flag is the same in both fidelities
+    }
+    const std::vector<std::string> keys = AblationKeys(experiment);
+    auto change = [&](const toml::node& node) {
+      const Scalar scalar = ReadScalar(file, "ablations", node);
+      const std::string text = ToWord("ablations", scalar), key = text.substr(0, text.find('='));
+      const auto& known_keys = key == text ? switches : keys;
+      if (!Contains(known_keys, key)) Unknown(scalar.origin, "name", key, known_keys);
+      experiment.ablations.back().push_back(text);
+    };
+    for (const toml::node& item : items("ablations", section.get("ablations"))) {
+      experiment.ablations.emplace_back();
+      if (!item.is_array()) {
+        change(item);
+      } else {
+        for (const toml::node& part : items("ablations", &item)) change(part);
+      }
+    }
+  }
+  return experiment;
+}
+
 }  // namespace
 
 const std::vector<AddedKey>& AddedKeys() {
@@ -436,6 +506,14 @@ const std::vector<AddedKey>& AddedKeys() {
 
 bool Concerns(const SwitchInfo& info, const RunConfig& config) {
   return Concerns(info, config.algorithm, SplitTasks(config.task).size() > 1);
+}
+
+bool Takes(const RunConfig& config, const std::string& key) {
+  const auto info = std::ranges::find(SwitchRegistry(), key, &SwitchInfo::name);
+  if (info != SwitchRegistry().end()) return Concerns(*info, config);
+  const auto numbers = config.hyper.Items();
+  return key == "workers" || std::any_of(numbers.begin(), numbers.end(),
+                                         [&](const auto& number) { return number.first == key; });
 }
 
 ConfigText OpenConfig(const std::string& config) {
@@ -559,49 +637,21 @@ std::unique_ptr<Algorithm> MakeRunAlgorithm(const RunConfig& config, const EnvSp
   return algorithm;
 }
 
-Experiment ReadExperiment(const ConfigText& file) {
+std::vector<Experiment> ReadExperiments(const ConfigText& file) {
   const toml::table root = Parse(file);
-  const toml::table* section = Section(file, root, "experiment");
-  if (!section) throw ConfigError(file.name + ": missing section [experiment]");
-
-  const std::vector<std::string> known = {"tasks", "algorithms", "fidelities", "seeds",
-                                          "ablations"};
-  for (const auto& [key, node] : *section) {
-    if (!Contains(known, key.str())) Unknown(Origin(file, node), "key", key.str(), known);
-  }
-  auto read = [&](const char* key, auto&& take) {
-    const toml::node* node = section->get(key);
-    if (!node) throw ConfigError(Concat(file.name, ": missing key '", key, "' in [experiment]"));
-    const toml::array* list = node->as_array();
-    if (!list || list->empty()) {
-      throw ConfigError(Concat(Origin(file, *node), ": '", key, "' must be a non-empty list"));
+  std::vector<Experiment> experiments;
+  const toml::node* node = root.get("experiment");
+  if (const toml::array* list = node ? node->as_array() : nullptr; list && !list->empty()) {
+    for (const toml::node& item : *list) {
+      if (!item.is_table()) throw ConfigError(Origin(file, item) + ": expected [[experiment]]");
+      experiments.push_back(ReadExperiment(file, *item.as_table()));
     }
-    for (const toml::node& item : *list) take(ReadScalar(file, key, item));
-  };
-  const auto tasks = Union({Ids(EnvRegistry()), PairNames()});
-  auto read_words = [&](const char* key, std::vector<std::string>& out,
-                        const std::vector<std::string>& ids) {
-    read(key, [&](const Scalar& scalar) {
-      out.push_back(ToWord(key, scalar));
-      if (!Contains(ids, out.back())) Unknown(scalar.origin, "name", out.back(), ids);
-    });
-  };
-  Experiment experiment;
-  experiment.name = std::filesystem::path(file.name).stem();
-  read_words("tasks", experiment.tasks, tasks);
-  read_words("algorithms", experiment.algorithms, Ids(AlgorithmRegistry()));
-  read_words("fidelities", experiment.fidelities, kFidelities);
-  read("seeds", [&](const Scalar& scalar) {
-    experiment.seeds.push_back(static_cast<std::uint64_t>(ToInt("seeds", scalar, 0)));
-  });
-  if (section->contains("ablations")) {
-    std::vector<std::string> switches;
-    for (const SwitchInfo& info : SwitchRegistry()) {
-      if (!info.flag) switches.push_back(info.name);  // a flag is the same in both fidelities
-    }
-    read_words("ablations", experiment.ablations, switches);
+  } else {
+    const toml::table* section = Section(file, root, "experiment");
+    if (!section) throw ConfigError(file.name + ": missing section [experiment]");
+    experiments.push_back(ReadExperiment(file, *section));
   }
-  return experiment;
+  return experiments;
 }
 
 }  // namespace o2v

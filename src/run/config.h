@@ -62,6 +62,8 @@ std::optional<ConfigText> FindSuite(const std::string& name);
 
 /// Whether the run's method reads the switch; those of transfer only in a run over several tasks.
 bool Concerns(const SwitchInfo& info, const RunConfig& config);
+/// Whether the key is a switch that concerns the run, or a number of its method.
+bool Takes(const RunConfig& config, const std::string& key);
 
 /// Layers, later ones win: run.toml, algo/<method>.toml, `config`, the request, its `set`. Throws
 /// ConfigError naming file, line and key for an unknown, missing or mistyped key.
@@ -80,16 +82,17 @@ RunConfig ParseRunConfig(const std::string& text, const std::string& file_name,
 std::unique_ptr<Algorithm> MakeRunAlgorithm(const RunConfig& config, const EnvSpec& spec,
                                             bool draw_weights = true);
 
-/// The lists of an experiment file; runs are their product.
+/// Lists of an experiment file; runs are their product.
 struct Experiment {
   std::string name;  // the file's, without folder and ".toml"
   std::vector<std::string> tasks, algorithms, fidelities;
   std::vector<std::uint64_t> seeds;
-  std::vector<std::string> ablations;  // switches, each turned alone to the other fidelity's
-                                       // setting; empty: runs of the fidelities as they are
+  // What is changed in a run, all at once: switches to turn to the other fidelity's setting, and
+  // settings "key=value". A run has one of these; none: the fidelities as they are.
+  std::vector<std::vector<std::string>> ablations;
 };
 
-/// Reads the section [experiment]. Throws ConfigError.
-Experiment ReadExperiment(const ConfigText& file);
+/// Reads the section [experiment], or all of several [[experiment]]. Throws ConfigError.
+std::vector<Experiment> ReadExperiments(const ConfigText& file);
 
 }  // namespace o2v

@@ -6,7 +6,7 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace o2v;
   const ConfigText file{"x.toml", std::string(Bytes(data, size))};
-  Accepts([&] { ReadExperiment(file); });
+  Accepts([&] { ReadExperiments(file); });
   Accepts([&] {
     RunRequest request;
     request.task = "Hopper-v2";

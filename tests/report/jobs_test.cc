@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <map>
+#include <set>
 #include <string>
 
 #include "base/check.h"
 #include "base/files.h"
+#include "env/pairs.h"
 #include "run/record.h"
 #include "test_folder.h"
 
@@ -102,23 +105,73 @@ TEST_F(Jobs, OfAnAblationTurnOneSwitchEach) {
   query.algorithms = {"option2vec"};
   query.seeds = {0};
   const auto jobs = ListJobs(query);
-  // Two of the seven switches concern the method; each in both fidelities.
-  ASSERT_EQ(jobs.size(), 4u);
+  // One switch of the first list, nine changes of the second, four numbers of options, and one
+  // option with one worker; each in both fidelities. The list of PPO's changes is PPO's alone.
+  ASSERT_EQ(jobs.size(), 2u * (1 + 9 + 4 + 1));
   EXPECT_EQ(
       jobs[0].command,
       "./option2vec train --config ablation --task Hopper-v2 --algo option2vec --fidelity paper "
       "--set timelimit=released --seed 0 --steps 1000000 --out "
       "results/ablation/paper-timelimit=released/Hopper-v2/option2vec/seed-000 --resume");
-  EXPECT_EQ(jobs[3].dir,
+  const Job& other = jobs[11];  // the first of the second list in `released`
+  EXPECT_EQ(other.dir,
             "results/ablation/released-o2v_option_in_update=paper/Hopper-v2/option2vec/seed-000");
   Switches one_turned = SwitchesFor(Fidelity::kReleased);
   one_turned.o2v_option_in_update = Fidelity::kPaper;
-  EXPECT_EQ(jobs[3].config.switches.o2v_option_in_update, Fidelity::kPaper);
+  EXPECT_EQ(other.config.switches.o2v_option_in_update, Fidelity::kPaper);
   for (const SwitchInfo& info : SwitchRegistry()) {
-    if (!Concerns(info, jobs[3].config)) continue;
-    EXPECT_EQ(SwitchValue(jobs[3].config.switches, info), SwitchValue(one_turned, info))
-        << info.name;
+    if (!Concerns(info, other.config)) continue;
+    EXPECT_EQ(SwitchValue(other.config.switches, info), SwitchValue(one_turned, info)) << info.name;
   }
+}
+
+TEST_F(Jobs, OfAnAblationChangeTheNumberOfOptions) {
+  JobQuery query = Query();
+  query.configs = {"ablation"};
+  query.results = "results";
+  std::map<std::string, int> runs;  // by folder of fidelity and change
+  std::map<std::string, std::set<std::string>> tasks;
+  std::set<std::filesystem::path> folders;
+  for (const Job& job : ListJobs(query)) {
+    EXPECT_TRUE(folders.insert(job.dir).second) << job.dir;  // none is there twice
+    const auto task = job.dir.parent_path().parent_path();
+    const std::string variant = task.parent_path().filename();
+    if (variant.find("options=") == std::string::npos) continue;
+    EXPECT_EQ(job.config.algorithm, "option2vec");
+    EXPECT_EQ(variant.find(Concat("options=", job.config.hyper.Int("options", 1))),
+              variant.find("options="));
+    EXPECT_EQ(job.config.steps, SplitTasks(job.config.task).size() * 1'000'000);
+    ++runs[variant];
+    tasks[variant].insert(task.filename());
+  }
+  for (const char* fidelity : {"paper", "released"}) {
+    for (const char* K : {"2", "8", "16"}) {
+      EXPECT_EQ(runs[Concat(fidelity, "-options=", K)], 4 * 5) << K;  // tasks, seeds
+    }
+    EXPECT_EQ(runs[Concat(fidelity, "-options=1")], 4 * 5 + 12 * 3);
+    EXPECT_EQ(tasks[Concat(fidelity, "-options=1")].size(), 10u + PairRegistry().size());
+    EXPECT_EQ(runs[Concat(fidelity, "-options=1-workers=1")], 2 * 5);
+  }
+}
+
+TEST_F(Jobs, OfAnAblationChangeSeveralThingsAtOnce) {
+  JobQuery query = Query();
+  query.configs = {"ablation"};
+  query.results = "results";
+  query.tasks = {"Hopper-v2"};
+  query.algorithms = {"ppo"};
+  query.fidelities = {"paper"};
+  query.seeds = {4};
+  const auto jobs = ListJobs(query);
+  // PPO has no options: timelimit, density_log_eps is not its own; then activation and workers.
+  ASSERT_EQ(jobs.size(), 1u + 3u);
+  EXPECT_EQ(jobs[3].command,
+            "./option2vec train --config ablation --task Hopper-v2 --algo ppo --fidelity paper "
+            "--set activation=relu --set workers=4 --seed 4 --steps 1000000 --out "
+            "results/ablation/paper-activation=relu-workers=4/Hopper-v2/ppo/seed-004 --resume");
+  EXPECT_EQ(jobs[3].config.workers, 4);
+  EXPECT_EQ(jobs[3].config.hyper.Real("activation"), 1);  // its place among tanh, relu
+  EXPECT_EQ(jobs[1].config.workers, 1);
 }
 
 TEST_F(Jobs, ProgressIsWhatFinishedRunsOfTheKindTook) {

@@ -438,16 +438,16 @@ TEST(MakeRunAlgorithm, RefusesANumberThatTheMethodDoesNotRead) {
 
 // ---- Experiments
 
-TEST(ReadExperiment, ReadsTheListsOfTheEmbeddedFiles) {
-  const Experiment quick = ReadExperiment(OpenConfig("quick"));
+TEST(ReadExperiments, ReadsTheListsOfTheEmbeddedFiles) {
+  const Experiment quick = ReadExperiments(OpenConfig("quick")).at(0);
   EXPECT_EQ(quick.name, "quick");
   EXPECT_EQ(quick.tasks, (std::vector<std::string>{"InvertedPendulum-v2", "HalfCheetah-v2"}));
   EXPECT_EQ(quick.algorithms, (std::vector<std::string>{"ppo", "option2vec"}));
   EXPECT_EQ(quick.seeds, (std::vector<std::uint64_t>{0, 1}));
 }
 
-TEST(ReadExperiment, TheSuiteOfCiHasEveryTaskAndMethod) {
-  const Experiment ci = ReadExperiment(OpenConfig("ci"));
+TEST(ReadExperiments, TheSuiteOfCiHasEveryTaskAndMethod) {
+  const Experiment ci = ReadExperiments(OpenConfig("ci")).at(0);
   std::set<std::string> tasks;
   for (const std::string& task : ci.tasks) {
     for (const std::string& id : SplitTasks(task)) tasks.insert(id);
@@ -456,9 +456,23 @@ TEST(ReadExperiment, TheSuiteOfCiHasEveryTaskAndMethod) {
   EXPECT_EQ(ci.algorithms.size(), AlgorithmRegistry().size());
 }
 
-TEST(ReadExperiment, RefusesBadLists) {
+TEST(ReadExperiments, ReadsSeveralWithWhatTheyChange) {
+  const std::string lists = "tasks = ['Ant-v2']\nfidelities = ['paper']\n";
+  const auto both = ReadExperiments(
+      {"x/y.toml", "[[experiment]]\nalgorithms = ['ppo']\nseeds = [3]\n" + lists +
+                       "[[experiment]]\nalgorithms = ['option2vec']\nseeds = [4]\n" + lists +
+                       "ablations = ['o2v_query', 'options=2', ['o2v_critic', 'workers=1']]\n"});
+  ASSERT_EQ(both.size(), 2u);
+  EXPECT_EQ(both[1].name, "y");
+  EXPECT_EQ(both[0].seeds, (std::vector<std::uint64_t>{3}));
+  EXPECT_EQ(both[0].ablations, (std::vector<std::vector<std::string>>{}));
+  EXPECT_EQ(both[1].ablations, (std::vector<std::vector<std::string>>{
+                                   {"o2v_query"}, {"options=2"}, {"o2v_critic", "workers=1"}}));
+}
+
+TEST(ReadExperiments, RefusesBadLists) {
   auto message = [](const std::string& lists) {
-    return Message([&] { ReadExperiment({"x.toml", "[experiment]\n" + lists}); });
+    return Message([&] { ReadExperiments({"x.toml", "[experiment]\n" + lists}); });
   };
   const std::string rest = "algorithms = ['ppo']\nfidelities = ['paper']\nseeds = [0]\n";
   EXPECT_CONTAINS(message(rest), "missing key 'tasks'");
@@ -471,7 +485,13 @@ TEST(ReadExperiment, RefusesBadLists) {
                   "x.toml:3");
   EXPECT_CONTAINS(message("tasks = ['Ant-v2']\nablations = ['time_limit']\n" + rest),
                   "'timelimit'");
-  EXPECT_CONTAINS(Message([] { ReadExperiment({"x.toml", "[run]\n"}); }), "[experiment]");
+  // A number that none of the methods has.
+  EXPECT_CONTAINS(message("tasks = ['Ant-v2']\nablations = ['options=1']\n" + rest), "x.toml:3");
+  EXPECT_CONTAINS(message("tasks = ['Ant-v2']\nablations = [['hiden=8']]\n" + rest), "'hidden'");
+  EXPECT_CONTAINS(message("tasks = ['Ant-v2']\nablations = [[]]\n" + rest), "x.toml:3");
+  for (const char* text : {"[run]\n", "experiment = []\n", "experiment = [1]\n"}) {
+    EXPECT_CONTAINS(Message([&] { ReadExperiments({"x.toml", text}); }), "experiment") << text;
+  }
 }
 
 }  // namespace
