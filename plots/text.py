@@ -242,6 +242,8 @@ tbody td:first-child { position: sticky; left: 0; background: var(--paper); }
   .lights th, .lights td { padding: .17rem .2rem; }
   .lights tbody td:first-child { min-width: 0; max-width: none; }
   .lights td small { display: block; }
+  .coverage table { font-size: .6rem; }
+  .coverage th, .coverage td { min-width: .8rem; }
   html { scroll-padding-top: 5.5rem; }
   nav { flex-wrap: wrap; gap: .1rem .8rem; font-size: .8rem; } }
 code { background: var(--soft); padding: 0 .2em; border-radius: .2em; }
