@@ -112,7 +112,8 @@ results/params.csv results/registry.json: $(wildcard $(O2V))
 	@$(O2V) $(ARGUMENTS) > $@.new && mv $@.new $@
 
 PLOTTING := python3 python3-numpy python3-scipy python3-matplotlib
-report: results/params.csv results/registry.json  ## write results/REPORT.md, report.html, README's box (EXPERIMENTS=ci: in results/ci; MINE=)
+# A report on own runs or another experiment leaves what is committed as it is.
+report: $(if $(EXPERIMENTS)$(MINE),,results/params.csv results/registry.json)  ## write results/REPORT.md, report.html, README's box (EXPERIMENTS=ci: in results/ci; MINE=)
 	@scripts/deps.sh $(PLOTTING)
 	@$(PYTHON) -m plots.long_table
 	@$(PYTHON) -m plots.report $(CHOICE) $(addprefix --mine ,$(MINE)) \

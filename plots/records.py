@@ -1,6 +1,7 @@
 """The records of results/ for the scripts here; their reader is python/option2vec_results."""
 
 import sys
+import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -13,7 +14,10 @@ from option2vec_results.records import (  # noqa: E402,F401
     read_numbers, read_run, read_table)
 from option2vec_results.run import load_run  # noqa: E402,F401
 
-GRID_METHODS = tuple(METHODS)  # METHODS has the joined ones, too
+_SUITE = Path(__file__).parents[1] / "paper_configs" / "single_task.toml"
+# METHODS also has those that are registered or joined without being part of the grid.
+GRID_METHODS = tuple(m for m in METHODS if m in tomllib.loads(
+    _SUITE.read_text(encoding="utf-8"))["experiment"]["algorithms"])
 joined: dict[Key, Cell] = {}  # runs from elsewhere, by plots/mine.py
 
 

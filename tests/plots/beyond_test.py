@@ -2,13 +2,14 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from plots import beyond, fig_options_count
+from plots import beyond, fig_options_count, report
 from plots.beyond import NO, YES, Part
 from plots.claims import UNDECIDED, UNMEASURED
 from plots.inputs import Inputs
 from plots.records import load_cells
 from plots.samples import persistence
 from plots.style import LOOKS
+from plots.text import to_markdown
 from tree import with_reference, write_flat, write_run
 
 TASK, OURS = "Hopper-v2", "option2vec"
@@ -93,6 +94,29 @@ class QuestionsTest(unittest.TestCase):
         write_flat(self.results, TASK, "ppo", [80, 120])
         parts, _ = self.parts("With one option")
         self.assertAlmostEqual(parts[TASK].effect, 0.2)
+
+    def test_the_section_of_the_report_fills_from_the_ablations(self):
+        def changed(variant, method, finals, settings, duration=2):
+            write_flat(self.results, TASK, method, finals, fidelity=f"paper-{variant}",
+                       settings=settings, experiment="ablation",
+                       options=",".join(["0.25"] * 4 + [str(duration)] * 4))
+
+        self.write(4, [150, 160])
+        self.write(1, [100, 100])
+        write_flat(self.results, TASK, "ppo", [60, 100])
+        changed("options=1-workers=1", OURS, [70, 80], "options = 1\nworkers = 1")
+        changed("o2v_critic=released", OURS, [1, 1], "options = 4", duration=4)
+        changed("activation=relu", "ppo", [85, 95], 'activation = "relu"')
+        inputs = Inputs(self.results)
+        text = to_markdown("", report._beyond(inputs, beyond.by_question(inputs)), "")
+        # Against 100 and 80. Chance is 1 / (1 - 4/16) = 4/3 steps: ratios 3 and 1.5.
+        self.assertIn("- `paper`: **undecided**: +55 % in the mean of 1 of 16 tasks", text)
+        self.assertIn("- `paper`: **undecided**: +25 % in the mean of 1 of 16 tasks", text)
+        self.assertIn("- `paper`: **yes**: 1 of 1 comparisons: o2v_critic=released, Hopper-v2", text)
+        self.assertIn("- `released`: **not measured**: no whole runs with one option", text)
+        self.assertIn("| Hopper-v2 | paper | PPO | activation=relu | 90.00 ± 5.000 (2) |", text)
+        self.assertIn("| Hopper-v2 | paper | Option2Vec, one option | workers=1 | 75.00 ± 5.000 (2) |",
+                      text)
 
     def test_persistence_is_the_duration_over_that_of_independent_draws(self):
         # Shares 0.5 and 0.5, 3 steps each: chance is 1 / (1 - 0.5) = 2. Shares 0.9 and 0.1, 10 and
