@@ -261,7 +261,7 @@ class RotationsTest(unittest.TestCase):
         claim, = (c for c in CLAIMS if c.id == "q4")
         finding, = claim.judge(Evidence("paper", {}, effects={self.PATH: effects}))
         self.assertEqual(ROTATIONS, 1000)
-        self.assertTrue(finding.measured.endswith(f"p = {1 / 1001:.2g}"), finding.measured)
+        self.assertIn(f"p = {1 / 1001:.2g}; 1 run on Hopper-v2", finding.measured)
         self.assertTrue(finding.measured.startswith("100 % of the effect"), finding.measured)
 
     def test_p_counts_rotations_that_are_as_large(self):
@@ -273,7 +273,7 @@ class RotationsTest(unittest.TestCase):
         with mock.patch("plots.claims.stats.ortho_group.rvs", return_value=rotations):
             finding, = claim.judge(Evidence("paper", {}, effects={self.PATH: 2 * np.eye(2)}))
         self.assertEqual(finding.measured, "100 % of the effect on primary actions, after rotation "
-                         "62 %, p = 0.25")
+                         "62 %, p = 0.25; 1 run on Hopper-v2")
 
 
 class CostTest(InFolder):
