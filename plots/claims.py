@@ -383,8 +383,8 @@ def _interpretable(evidence: Evidence) -> Sequence[Finding]:
     tasks = sorted({path.parts[-3] for path in several})
     return [Finding("embedding", verdict,
                     f"{100 * share:.0f} % of the effect on primary actions, after rotation "
-                    f"{100 * others.mean():.0f} %, {p_clause(p)}; {len(shares)} run{'s' * (len(shares) > 1)} on "
-                    f"{', '.join(tasks)}", (len(shares),), bool(share > others.mean()))]
+                    f"{100 * others.mean():.0f} %, {p_clause(p)}; {len(shares)} "
+                    f"{'run' if len(shares) == 1 else 'runs'} on {', '.join(tasks)}", (len(shares),), bool(share > others.mean()))]
 
 
 # ---- The ledger
