@@ -1,7 +1,7 @@
 """Panels of learning curves: tasks by sources (paper, released, the authors' logs).
 
-Option2Vec and the best of its rivals stand out: thick, with a band. The others are thin. Beyond the
-last step each method's end point has an interval.
+Option2Vec, the best of its rivals and joined methods stand out: thick, with a band. The others are
+thin. Beyond the last step each method's end point has an interval.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from plots.records import MILLION
+from plots.records import GRID_METHODS, MILLION
 from plots.samples import Sample, Samples
 from plots.statistics import one_sample
 from plots.style import (GREY, INK, LOOKS, METHODS, Margins, legend_above, line_of, new_figure,
@@ -45,10 +45,10 @@ def draw_curves(tasks: Sequence[str], methods: Sequence[str], sources: Mapping[s
             if task in behind and source != "authors":
                 curve = behind[task].curve
                 panel.plot(thin(curve.step) / MILLION, thin(curve.mean), **BEHIND)
-            best = max((m for m in found if m != OURS), default=None,
-                       key=lambda m: found[m].moments.mean)
+            rivals = [m for m in found if m in GRID_METHODS and m != OURS]
+            best = max(rivals, default=None, key=lambda m: found[m].moments.mean)
             for method, sample in reversed(found.items()):  # Option2Vec on top
-                _curve(panel, method, sample, method in (OURS, best))
+                _curve(panel, method, sample, method == best or method not in rivals)
             panel.set_title(f"{task}, {TITLES[source]}\n{_coverage(found, methods)}",
                             loc="left")
         limits = [limit for panel in panels if panel.lines for limit in panel.get_ylim()]

@@ -5,12 +5,15 @@ from pathlib import Path
 
 import numpy as np
 
-from plots import mine, records
+from plots import fig_aggregate, mine, records
+from plots.claims import OURS, RIVALS
+from plots.curves import draw_curves
+from plots.inputs import Inputs
 from plots.long_table import long_table
-from plots.records import METHODS, DamagedFile, Key, load_cells
+from plots.records import METHODS, PAIRS, TASKS, DamagedFile, Key, load_cells
 from plots.samples import our_samples
 from plots.style import LOOKS
-from tree import write_run
+from tree import with_reference, write_flat, write_run
 
 TASK = "Hopper-v2"
 
@@ -70,6 +73,44 @@ class MineTest(unittest.TestCase):
         self.assertEqual(lines[1:], ["paper,,Hopper-v2,ppo,0,0,10000,1.0",
                                      "paper,,Hopper-v2,PPO (mine),0,0,10000,5.0",
                                      "released,,Hopper-v2,PPO (mine),0,0,10000,5.0"])
+
+    def test_they_are_measured_against_the_rival_of_option2vec(self):
+        # Best rival 8: Option2Vec's 12 is 0.5 above it. Mine has 16 and 8: 12 in the mean, IQM of
+        # 0 and 1 the same 0.5. It is above PPO, and yet no rival.
+        with_reference(self.folder)
+        for method, final in (dict.fromkeys(RIVALS, [6, 6]) | {OURS: [10, 14], "ppo": [8, 8]}).items():
+            write_flat(self.folder, TASK, method, final)
+        rows = [("SAC", TASK, seed, 1_000_000, ret) for seed, ret in ((0, 16), (1, 8))]
+        mine.join([self.table(rows, "method,task,seed,step,return_20")])
+        drawing, = fig_aggregate.draw(Inputs(self.folder))
+        place = list(fig_aggregate.ORDER).index("paper")
+        panel, profile = drawing.figure.axes[place::len(fig_aggregate.ORDER)]
+        self.assertEqual([t.get_text() for t in panel.texts], ["PPO", "+0.50", "+0.50"])
+        dots = {line.get_color(): line.get_xydata().tolist()
+                for line in panel.lines if len(line.get_xdata()) == 1 and line.get_ydata()[0] > 0}
+        row = float(len((*TASKS, *PAIRS)) - TASKS.index(TASK))
+        self.assertEqual(dots, {LOOKS[OURS].color: [[0.5, row]],
+                                LOOKS["SAC"].color: [[0.5, row - 0.5]]})
+        # The mean of a resample of 1 and 0 is each of them a quarter of the times.
+        bar, = (c for c in panel.collections if c.get_paths()[0].vertices[0, 1] == row - 0.5)
+        self.assertEqual(bar.get_paths()[0].vertices[:, 0].tolist(), [0, 1])
+        # Option2Vec's runs are at 0.25 and 0.75, mine at 1 and 0.
+        for method, shares in ((OURS, (1, 0.5, 0)), ("SAC", (0.5, 0.5, 0.5))):
+            line, = (x for x in profile.lines if x.get_color() == LOOKS[method].color)
+            self.assertEqual(np.interp((0.2, 0.4, 0.9), *line.get_data()).tolist(), list(shares))
+        self.assertIn("SAC", [t.get_text() for t in drawing.figure.legends[0].get_texts()])
+
+    def test_their_curves_stand_out_beside_the_best_rival(self):
+        for method, final in ((OURS, [5]), ("ppo", [3]), ("oc", [2])):
+            write_flat(self.folder, TASK, method, final)
+        rows = [("SAC", TASK, 0, step, 4) for step in (500_000, 1_000_000)]
+        mine.join([self.table(rows, "method,task,seed,step,return_20")])
+        samples = our_samples(load_cells(self.folder), "paper")
+        panel = draw_curves((TASK,), tuple(METHODS), {"paper": samples}, {}).axes[0]
+        widths = {line.get_color(): line.get_linewidth() for line in panel.lines
+                  if len(line.get_xdata()) > 2}
+        self.assertEqual(widths, {LOOKS[OURS].color: 2, LOOKS["SAC"].color: 2,
+                                  LOOKS["ppo"].color: 2, LOOKS["oc"].color: 0.7})
 
     def test_folders_of_runs_need_no_layout(self):
         self.run_folder("a", list(range(1, 31)))
