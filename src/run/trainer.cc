@@ -197,7 +197,12 @@ class Run {
     return task;
   }
 
+  /// Keeps the policy that the task before has left.
   void ChangeTask() {
+    Normalizer normalizer = env_.normalizer();
+    SavePolicy(dir_ / (env_.Spec().id + ".safetensors"),
+               Describe(config_, env_.Spec(), *algorithm_, env_.TotalSteps()), *algorithm_,
+               normalizer);
     task_ = TaskAt(env_.TotalSteps());
     env_.ChangeTask(MakeTask(task_), config_.switches.switch_init_flag == Fidelity::kPaper);
     algorithm_->ChangeTask();

@@ -78,6 +78,25 @@ TEST_F(Transfer, TheLogGoesOnAndTheOldTasksEpisodesAreForgotten) {
   EXPECT_GT(on_second, 10);
 }
 
+TEST_F(Transfer, KeepsThePolicyThatTheFirstTaskLeaves) {
+  Run("pair");
+  parts_.tasks = 1;
+  config_.steps = 110;
+  Run("first alone");
+  const std::filesystem::path kept = dir_ / "pair" / "Fake-v0.safetensors";
+  EXPECT_EQ(ReadMetadata(kept).at("total_steps"), "110");
+  const EnvSpec spec = FakeEnv().Spec();
+  FakeAlgorithm policy(spec, 0), expected(spec, 1);
+  Normalizer normalizer(spec.S), statistics(spec.S);
+  LoadPolicy(kept, policy, normalizer);
+  LoadPolicy(dir_ / "first alone" / "last.ckpt", expected, statistics);
+  for (std::size_t i = 0; i < policy.Params().size(); ++i) {
+    EXPECT_EQ(policy.Params()[i]->value, expected.Params()[i]->value);
+  }
+  EXPECT_EQ(normalizer.mean(), statistics.mean());
+  EXPECT_EQ(normalizer.var(), statistics.var());
+}
+
 TEST_F(Transfer, GoesOnFromAnInterruptionOnEitherSide) {
   struct Interrupt {};
   config_.checkpoint_every = 55;  // after 60, 110 (the change itself), 170 and 200 steps
