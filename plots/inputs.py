@@ -33,5 +33,6 @@ class Inputs:
     gradcheck: Rows = cached_property(lambda self: read_rows(self.results, "gradcheck"))
     parity: Rows = cached_property(lambda self: read_rows(self.results, "parity"))
     theory: Rows = cached_property(lambda self: read_rows(self.results, "theory"))
+    information: Rows = cached_property(lambda self: read_rows(self.results, "policies/options"))
     bench: Rows = cached_property(lambda self: read_bench(self.results))
     switches: Rows = cached_property(lambda self: read_switches(self.results))

@@ -88,7 +88,8 @@ def evidence_of(inputs: Inputs) -> dict[str, Evidence]:
     effects = {path: found.effects for path, found in inputs.interpretations.items()}
     ours = {f: Evidence(f, inputs.sources[f], parameter_counts(inputs.params, f), inputs.bench,
                         inputs.gradcheck, inputs.theory,
-                        {p: e for p, e in effects.items() if p.parts[-4] == f})
+                        {p: e for p, e in effects.items() if p.parts[-4] == f},
+                        inputs.information)
             for f in FIDELITIES}
     return ours | {"authors": Evidence("authors", inputs.sources["authors"], AUTHORS_PARAMETERS)}
 

@@ -22,6 +22,9 @@ COLUMNS: dict[str, Columns] = {
     "theory": {  # make theory
         "name": str, "gap": finite, "relation": str, "tolerance": finite, "verdict": str,
         "compared": str},
+    "policies/options": {  # make timelines
+        "policy": str, "steps": int, "entropy_bits": finite, "with": str, "bits": finite,
+        "shuffled_bits": finite, "shuffled_95_bits": finite},
 }
 PARTS = ("physics_us", "inference_us", "learning_us")  # of an environment step
 COUNTERS = PARTS + ("total_us", "bound_us", "bound_products_us", "bound_adam_us", "MFLOP", "ratio")

@@ -76,8 +76,14 @@ def explain(task: str, steps: dict[str, np.ndarray]) -> dict[str, Information]:
     found |= {name.partition(" [")[0]: information(o, bins) for name, bins in phases.items()}
     if len(phases) > 1:
         together = sum(bins * BINS**i for i, bins in enumerate(phases.values()))
-        found["both"] = information(o, together)
+        found[phase_of(task)] = information(o, together)
     return found
+
+
+def phase_of(task: str) -> str:
+    """What explain calls the phase that all quantities of a task make together."""
+    only, *more = QUANTITIES[task]
+    return "both" if more else only.partition(" [")[0]
 
 
 def draw(name: str, task: str, steps: dict[str, np.ndarray]) -> Drawing:

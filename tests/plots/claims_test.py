@@ -199,6 +199,39 @@ class AloneTest(unittest.TestCase):
 
 
 class OtherTest(unittest.TestCase):
+    def phases(self, source: str, *measured: tuple[str, float, float]) -> tuple[str, dict]:
+        """measured: by task bits of the phase and of the option's entropy; of shuffles 0.1."""
+        return judged("phases", Evidence(source, {}, information=[
+            {"policy": f"{task}-paper", "steps": 5000, "entropy_bits": entropy, "with": what,
+             "bits": bits, "shuffled_bits": 0.1, "shuffled_95_bits": 0.2}
+            for task, bits, entropy in measured
+            for what in ("option before", "height", "speed", "both")]))
+
+    def test_options_coincide_with_phases_by_the_share_of_the_entropy(self):
+        # (bits - 0.1) / entropy: 0.5, 0.45, 0.11, 0.095; then 0.5 within the shuffles, and an option
+        # that acts nearly always.
+        for bits, entropy, expected in ((0.6, 1, HOLDS), (1, 2, UNDECIDED), (0.32, 2, UNDECIDED),
+                                        (0.29, 2, FAILS), (0.2, 0.2, FAILS), (0.9, 0.09, FAILS)):
+            _, parts = self.phases("paper", ("Hopper-v2", bits, entropy))
+            found = {part: finding.verdict for part, finding in parts.items()}
+            self.assertEqual(found.pop("Hopper-v2"), expected, (bits, entropy))
+            self.assertEqual(set(found.values()), {UNMEASURED})
+            self.assertEqual(len(found), 6)
+
+    def test_four_of_seven_tasks_decide_whether_options_coincide_with_phases(self):
+        tasks = ("Swimmer-v2", "Hopper-v2", "Ant-v2", "Walker2d-v2")
+        for share, expected in ((0.5, HOLDS), (0.3, UNDECIDED), (0.05, FAILS)):
+            given = [(task, share + 0.1, 1.0) for task in tasks]
+            self.assertEqual(self.phases("paper", *given)[0], expected)
+            self.assertEqual(self.phases("paper", *given[1:])[0], UNDECIDED)
+        self.assertEqual(self.phases("released", *given)[0], UNMEASURED)  # they are of paper
+        self.assertEqual(self.phases("authors", *given)[0], APART)
+        _, parts = self.phases("paper", ("Hopper-v2", 0.6, 1))
+        finding = parts["Hopper-v2"]
+        self.assertEqual((finding.measured, finding.n, finding.literal), (
+            "the phase tells 0.60 (shuffled 0.10), the option before tells 0.60 (shuffled 0.10) of "
+            "1.00 bits", (1,), True))
+
     def test_the_share_of_parameters_depends_on_the_width(self):
         evidence = Evidence("released", {}, AUTHORS_PARAMETERS)
         verdicts = [judged(f"share-{width}", evidence) for width in (64, 128)]
