@@ -86,16 +86,18 @@ watch:  ## evaluate and film a trained policy, build/films/*.mp4 (TASK=HalfCheet
 	@$(MAKE) --no-print-directory deps FILM=1
 	@$(COMPILE) --target option2vec
 	@mkdir -p build/films
-	@$(O2V) eval --checkpoint results/policies/$(WATCHED).safetensors --episodes 3 --action mean
-	@$(O2V) film --checkpoint results/policies/$(WATCHED).safetensors --action mean --size 480x360 \
-	    --out build/films/$(WATCHED).mp4
+	@$(O2V) eval --checkpoint results/policies/$(WATCHED).safetensors --task $(TASK) --episodes 3 \
+	    --action mean
+	@$(O2V) film --checkpoint results/policies/$(WATCHED).safetensors --task $(TASK) --action mean \
+	    --size 480x360 --out build/films/$(WATCHED).mp4
 
 timelines: deps  ## draw the options over an episode of each trained policy: build/timelines
 	@$(COMPILE) --target option2vec
 	@mkdir -p build/timelines
 	@for file in results/policies/*.safetensors; do \
-	    $(O2V) eval --checkpoint $$file --episodes 5 --action mean > /dev/null \
-	        --trajectory build/timelines/$$(basename $$file .safetensors).csv || exit; \
+	    name=$$(basename $$file .safetensors); \
+	    $(O2V) eval --checkpoint $$file --task $${name%-*} --episodes 5 --action mean > /dev/null \
+	        --trajectory build/timelines/$$name.csv || exit; \
 	done
 	@$(PYTHON) -m plots.timeline --out build/timelines $(patsubst \
 	    results/policies/%.safetensors,build/timelines/%.csv,$(wildcard results/policies/*.safetensors))
