@@ -24,7 +24,8 @@ enum class Freeze {
 /// All switches of spec 8. Most act in one file. Several: timelimit where a method values a step
 /// that the time limit ended (PpoMethod, OC, IOPG); density_log_eps where one takes the logarithm
 /// of a density or probability (LogDensity, OptionLog, IOPG); beta_index (DAC+PPO, PPOC, OC, IOPG);
-/// adam_idle (Method, Option2Vec); switch_init_flag (trainer, IOPG).
+/// adam_idle (Method, Option2Vec); switch_init_flag (trainer, IOPG); contact_forces (where tasks
+/// are made, MujocoEnv).
 struct Switches {
   Fidelity timelimit = Fidelity::kPaper;             // bootstrap at truncation | terminal
   double adv_std_eps = 1e-8;                         // added to the advantages' std | 0

@@ -47,7 +47,7 @@ CLI::Option* AddReal(CLI::App& app, const std::string& name, double& value, doub
 inline constexpr int kMaxInt = std::numeric_limits<int>::max();
 inline constexpr std::int64_t kMaxWhole = std::numeric_limits<std::int64_t>::max();
 
-/// Options that name a task and a method, of `train`, `eval`, `forward` and `interpret`.
+/// Options that name a task and a method: of `train`, and of commands that take a policy.
 struct RunOptions {
   RunRequest request;
   std::optional<std::string> config;
@@ -60,7 +60,7 @@ void NoteSignals();
 /// Whether one has come.
 bool Signalled();
 
-/// Records that do not count, on standard error, and how many they are.
+/// Prints refused records and their number to standard error.
 void NameRefused(const std::vector<std::string>& refused);
 
 }  // namespace o2v

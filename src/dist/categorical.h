@@ -1,5 +1,5 @@
 #pragma once
-// Categorical distributions, one a column.
+// Categorical distributions, one per column.
 
 #include <span>
 #include <vector>

@@ -1,5 +1,5 @@
 #pragma once
-// Diagonal Gaussians, one a column.
+// Diagonal Gaussians, one per column.
 
 #include "base/rng.h"
 #include "base/types.h"

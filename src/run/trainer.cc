@@ -75,7 +75,7 @@ class TimingLog {
   fs::path path_;
 };
 
-/// Thrown out of an iteration whose evaluation was stopped. No checkpoint can stand between an
+/// Thrown when a signal stops an evaluation. No checkpoint can stand between an
 /// update and its evaluation, so the run goes on from the one before.
 struct StoppedInEvaluation {};
 
