@@ -129,6 +129,30 @@ class QuestionsTest(unittest.TestCase):
         parts, _ = self.parts("Do its options last")
         self.assertAlmostEqual(parts[TASK].effect, 0.25)
 
+    def test_rows_of_the_last_tenth_count_by_their_steps(self):
+        # Rows of shares 1/2, 1/2 with 3 steps each, and of 0.9, 0.1 with 10 and 10/9, 1 / 0.18 steps
+        # together. Equally many steps of both: durations 2 / (1/3 + 0.18), chance 2 / (0.5 + 0.18).
+        path = write_run(self.results, TASK, OURS, 0, [1] * 20, options="0.5,0.5,3,3")
+        csv = path.with_suffix(".csv")
+        lines = csv.read_text().splitlines()
+        lines[-1] = f"200000,1,0.9,0.1,10,{10 / 9}"
+        csv.write_text("\n".join(lines) + "\n")
+        run, = (r for c in load_cells(self.results).values() for r in c.runs)
+        self.assertAlmostEqual(persistence(run), (0.5 + 0.18) / (1 / 3 + 0.18))
+
+    def test_switches_are_compared_over_whole_runs(self):
+        # 4 steps an option with the switch, 3 without; chance is 2. The run that broke off, with
+        # 40, says nothing.
+        for seed in range(2):
+            for variant, steps in (("", 3), ("-o2v_query=released", 4)):
+                write_run(self.results, TASK, OURS, seed, [1] * 20, fidelity=f"paper{variant}",
+                          options=f"0.5,0.5,{steps},{steps}", settings="options = 4")
+        write_run(self.results, TASK, OURS, 2, [1] * 19, fidelity="paper-o2v_query=released",
+                  options="0.5,0.5,40,40", settings="options = 4", status="diverged",
+                  steps=195_000, wanted=200_000)
+        parts, _ = self.parts("Does one switch")
+        self.assertAlmostEqual(parts[f"o2v_query=released, {TASK}"].effect, 0.5)
+
     def test_one_option_alone_has_no_persistence(self):
         self.write(1, [1])
         run, = (r for c in load_cells(self.results).values() for r in c.runs)

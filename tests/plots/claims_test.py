@@ -149,6 +149,23 @@ class AgainstTheBestTest(unittest.TestCase):
             verdict, _ = judged("q2-variance", versus(INFINITE, ours, {"ppo": best}))
             self.assertEqual(verdict, expected)
 
+    def test_spread_is_measured_from_the_medians(self):
+        # Deviations from the medians 11.5 and 20 have the means 5/6 and 13/6, their squares about
+        # them 4/3 and 341/6: F = (16/3) / 5.817 = 0.917 with 1 and 10 degrees of freedom, p 0.36.
+        # From the means 11.5 and 22.17 they would be told apart, p 0.003.
+        evidence = versus(INFINITE, [10, 11, 11, 12, 12, 13], {"ppo": [20, 20, 20, 20, 26, 27]})
+        verdict, parts = judged("q2-variance", evidence)
+        self.assertEqual(verdict, UNDECIDED)
+        self.assertIn("p = 0.36", parts["Swimmer-v2"].measured)
+
+    def test_without_a_rival_nothing_is_said_about_the_best_of_them(self):
+        samples = {(t, m): sample(x, t) for t in FINITE + INFINITE
+                   for m, x in ((OURS, [99, 100, 101]), ("ppo", [90, 95, 100]))}
+        for id, task in (("q2-comparable", "Ant-v2"), ("q2-variance", "Swimmer-v2")):
+            part = judged(id, Evidence("paper", samples))[1][task]
+            self.assertEqual(part.verdict, UNDECIDED)
+            self.assertTrue(part.measured.endswith("; no runs of DAC+PPO, AHP+PPO, PPOC, OC"))
+
     def test_spread_that_no_test_can_judge_is_undecided(self):
         # All deviations from the medians 2 and 3 are 1: Brown-Forsythe's F is 0 / 0.
         evidence = versus(INFINITE, [1, 1, 3, 3], {"ppo": [2, 2, 4, 4]})
@@ -188,6 +205,13 @@ class AloneTest(unittest.TestCase):
             evidence = Evidence("paper", {
                 (t, OURS): sample([1], t, gains=gains, progress=100) for t in TASKS})
             self.assertEqual(judged("converged", evidence)[0], expected)
+
+    def test_convergence_has_the_same_margin_where_the_return_fell(self):
+        evidence = Evidence("paper", {
+            (t, OURS): sample([1], t, gains=[1, 2, 1, 2], progress=-100) for t in TASKS})
+        verdict, parts = judged("converged", evidence)
+        self.assertEqual(verdict, HOLDS)
+        self.assertIn("margin 5.00", parts["Ant-v2"].measured)
 
     def test_durations_grow_by_run(self):
         for late, expected in (([5, 15, 25], HOLDS), ([1, 9, 19], FAILS), ([1, 20, 21], UNDECIDED)):
@@ -334,6 +358,13 @@ class OtherTest(unittest.TestCase):
         verdict, parts = judged("q4", Evidence("paper", {}, effects=effects))
         self.assertEqual((verdict, parts["embedding"].n), (FAILS, (20,)))
         self.assertIn("20 runs on Ant-v2, Hopper-v2", parts["embedding"].measured)
+
+    def test_two_embeddings_without_structure_are_too_few_to_fail(self):
+        # Shares of noise differ by points from run to run: with one degree of freedom the interval
+        # reaches far beyond 5 points on both sides.
+        rng = np.random.default_rng(13)
+        effects = {Path(f"seed-{i}"): rng.normal(size=(6, 3)) for i in range(2)}
+        self.assertEqual(judged("q4", Evidence("paper", {}, effects=effects))[0], UNDECIDED)
 
     def test_the_authors_logs_say_what_is_known_of_them(self):
         # Welch's p of these comparisons, worked out from the logs on their own: HalfCheetah

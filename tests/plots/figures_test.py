@@ -198,6 +198,14 @@ class OptionsTest(InFolder):
 
 
 class AggregateTest(InFolder):
+    def test_a_rival_that_ended_early_is_not_the_best(self):
+        write_flat(self.results, "Hopper-v2", "ppo", [5, 6])
+        write_flat(self.results, "Hopper-v2", "dac_ppo", [3, 4])
+        write_run(self.results, "Hopper-v2", "oc", 0, [900] * 50)
+        samples = our_samples(load_cells(self.results), "paper")
+        self.assertTrue(samples["Hopper-v2", "oc"].shortened)
+        self.assertEqual(fig_aggregate.best_rival(samples, "Hopper-v2")[0], "ppo")
+
     def test_dots_are_differences_in_units_of_the_best_rival(self):
         # Option2Vec 12, rivals 8 and 6: (12 - 8) / 8 = 0.5 above the better one. Reacher's returns
         # are negative: (-6 - -4) / 4 = -0.5; there rivals are missing.

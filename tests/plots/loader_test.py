@@ -10,6 +10,7 @@ from plots.records import METHODS, DamagedFile
 from tree import ROOT, write_run
 
 from option2vec_results import load_policy, load_records, load_run
+from option2vec_results.standard import standard
 
 RECORDS = ROOT / "tests" / "data" / "records"
 
@@ -36,6 +37,12 @@ class RecordsTest(InFolder):
         np.testing.assert_array_equal(columns["usage_1"], [np.nan, np.nan, 0.25])
         np.testing.assert_array_equal(columns["duration_0"], [np.nan, np.nan, 8])
         np.testing.assert_array_equal(columns["duration_1"], [np.nan] * 3)
+
+    def test_an_experiment_wins_over_the_methods_own_numbers(self):
+        # paper_configs/algo/ppo.toml has rollouts of 2048 steps, ci.toml of 512.
+        for experiment, rollout in (("single_task", 2048), ("ci", 512)):
+            self.assertEqual(standard(experiment, "paper", "Hopper-v2", "ppo", False)["rollout"],
+                             rollout)
 
     def test_a_folder_may_be_all_results_or_an_experiment(self):
         write_run(self.folder, "Hopper-v2", "ppo", 0, [1])
@@ -115,6 +122,13 @@ class PolicyFileTest(InFolder):
             "normalizer.mean": {"dtype": "F64", "shape": [3, 1], "data_offsets": [0, 24]},
             "normalizer.var": {"dtype": "F64", "shape": [3, 1], "data_offsets": [24, 48]}}, data)))
         np.testing.assert_allclose(policy.normalise(np.array([5, 1, 4])), [2, -2, 10], rtol=1e-7)
+
+    def test_a_variance_has_1e_8_added_below_its_root(self):
+        data = struct.pack("<2d", 3, 1e-8)
+        policy = load_policy(self.write(safetensors({
+            "normalizer.mean": {"dtype": "F64", "shape": [1, 1], "data_offsets": [0, 8]},
+            "normalizer.var": {"dtype": "F64", "shape": [1, 1], "data_offsets": [8, 16]}}, data)))
+        np.testing.assert_allclose(policy.normalise(np.array([3.0002])), [2**0.5], rtol=1e-7)
 
     def test_cut_and_broken_files_are_refused_by_name(self):
         tensor = {"dtype": "F32", "shape": [2], "data_offsets": [0, 8]}

@@ -159,6 +159,31 @@ class SamplesTest(InFolder):
         self.assertEqual(sample.progress, 95.5 + 5 - 6)
         self.assertFalse(sample.shortened)
 
+    def test_a_run_is_judged_at_its_horizon(self):
+        # 150 rows of a task that has 1 000 000 steps, which are the first 100.
+        write_run(self.results, TASK, "ppo", 0, list(range(1, 151)))
+        sample = our_samples(load_cells(self.results), "paper")[TASK, "ppo"]
+        self.assertEqual((list(sample.final), sample.step), ([100], 1_000_000))
+        self.assertEqual((sample.curve.step[-1], sample.area.mean), (1_000_000, 50.5))
+
+    def test_jumps_are_those_of_the_second_half(self):
+        # Steps beyond half of the last one: 9, 5, 9, 5, 9, whose changes -4, 4, -4, 4 have the
+        # deviation 4. The first half jumps further.
+        write_run(self.results, TASK, "ppo", 0, [0, 90, 0, 90, 0, 9, 5, 9, 5, 9])
+        sample = our_samples(load_cells(self.results), "paper")[TASK, "ppo"]
+        self.assertEqual(list(sample.jumps), [4])
+
+    def test_a_run_that_diverges_after_its_last_step_is_whole(self):
+        self.assertEqual(self.diverged(30_000), ([1, 9], 0))
+        self.assertEqual(self.diverged(20_000), ([1], 1))
+
+    def diverged(self, steps: int) -> tuple[list[float], int]:
+        for seed, status, made, last in ((0, "done", 30_000, 1), (1, "diverged", steps, 9)):
+            write_run(self.results, TASK, "ppo", seed, [last] * (made // 10_000), status=status,
+                      steps=made, wanted=30_000)
+        sample = our_samples(load_cells(self.results), "paper")[TASK, "ppo"]
+        return list(sample.final), sample.diverged
+
     def test_the_first_value_is_held_before_it(self):
         path = write_run(self.results, TASK, "ppo", 0, [1, 2, 3, 4]).with_suffix(".csv")
         path.write_text(path.read_text().replace("10000,1\n20000,2\n", ""))

@@ -238,6 +238,24 @@ class ReportTest(unittest.TestCase):
             "n": "10 (Reacher)"})
         self.assertEqual(claim["verdicts"]["paper"]["seeds"], [3, 3])
 
+    def test_something_changed_is_compared_by_seed_and_over_equally_many_steps(self):
+        with tempfile.TemporaryDirectory() as folder:
+            results, turned = Path(folder), "paper-timelimit=released"
+            for seed, last in ((0, 1), (1, 20), (2, 300)):
+                write_run(results, "Hopper-v2", "ppo", seed, [last] * 10)
+            for seed, last in ((1, 25), (2, 306), (3, 9000)):
+                write_run(results, "Hopper-v2", "ppo", seed, [last] * 10, fidelity=turned,
+                          experiment="ablation")
+            write_run(results, "Swimmer-v2", "ppo", 0, [1] * 10)
+            write_run(results, "Swimmer-v2", "ppo", 0, [5] * 5, fidelity=turned,
+                      experiment="ablation")
+            gains = {}
+            cells = load_cells(results)
+            for key, cell in cells.items():
+                if key.variant:
+                    gains[key.task] = report._gains(cell, cells[key._replace(variant="")])
+            self.assertEqual(gains, {"Hopper-v2": [5, 6], "Swimmer-v2": []})
+
     def test_missing_runs_are_named(self):
         self.assertEqual(self.row("HalfCheetah-v2", "seeds")[1],
                          "seeds 3-9 of Option2Vec; seeds 0-9 of DAC-OneStep, DAC+PPO, AHP+PPO, "

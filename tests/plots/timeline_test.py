@@ -59,6 +59,13 @@ class TimelineTest(unittest.TestCase):
         expected = 1 + p * np.log2(p) + (1 - p) * np.log2(1 - p)
         self.assertAlmostEqual(found["option before"].bits, expected, delta=0.005)
 
+    def test_chance_is_shown_by_its_95th_percentile(self):
+        # Of the 70 orders of four of each, 2 (2.9 %) agree with o in all or in no place: 1 bit. In 32
+        # three of a kind agree: 1 - H(1/4) = 0.189 bit. The 95 % quantile is below the first kind.
+        o = np.repeat([0, 1], 4)
+        p = np.array([0.25, 0.75])
+        self.assertAlmostEqual(information(o, o, shuffles=2000).high, 1 + (p * np.log2(p)).sum())
+
     def test_a_new_episode_has_no_option_before(self):
         # 1 in the first half of 100 steps, then 0: were ends counted, 0 -> 1 would be there, too.
         o = np.tile(np.repeat([1.0, 0.0], 50), 2)
