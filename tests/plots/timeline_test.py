@@ -60,11 +60,11 @@ class TimelineTest(unittest.TestCase):
         self.assertAlmostEqual(found["option before"].bits, expected, delta=0.005)
 
     def test_chance_is_shown_by_its_95th_percentile(self):
-        # Of the 70 orders of four of each, 2 (2.9 %) agree with o in all or in no place: 1 bit. In 32
-        # three of a kind agree: 1 - H(1/4) = 0.189 bit. The 95 % quantile is below the first kind.
-        o = np.repeat([0, 1], 4)
-        p = np.array([0.25, 0.75])
-        self.assertAlmostEqual(information(o, o, shuffles=2000).high, 1 + (p * np.log2(p)).sum())
+        # Of the 28 places of two among eight one (3.6 %) is o's, 15 share none with it: then
+        # H(1/4) + H(1/4) - H(1/4, 1/4, 1/2) = 0.1226 bit. The twelve that share one have less.
+        o = np.repeat([0, 1], (2, 6))
+        expected = 2 * entropy(o) - 1.5
+        self.assertAlmostEqual(information(o, o, shuffles=2000).high, expected)
 
     def test_a_new_episode_has_no_option_before(self):
         # 1 in the first half of 100 steps, then 0: were ends counted, 0 -> 1 would be there, too.
