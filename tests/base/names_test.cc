@@ -10,6 +10,10 @@ TEST(Nearest, PutsTheLeastDistanceFirst) {
   EXPECT_EQ(Nearest("kitten", {"kitchen", "sitting", "mitten"}), "'mitten', 'kitchen', 'sitting'");
 }
 
+TEST(Nearest, CountsALetterForAnotherAsOneLikeALetterLess) {
+  EXPECT_EQ(Nearest("cat", {"cot", "at"}), "'cot', 'at'");  // 1 and 1
+}
+
 TEST(Nearest, ShowsNoMoreThanThree) {
   EXPECT_EQ(Nearest("a", {"abcd", "abc", "ab", "a"}), "'a', 'ab', 'abc'");
 }

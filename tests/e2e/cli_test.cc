@@ -192,11 +192,15 @@ TEST_F(Program, RecordsAFinishedRunAnew) {
             0);
   const std::string csv = ReadFile(dir_ / "run.csv"), json = ReadFile(dir_ / "run.json");
   EXPECT_NE(csv.find("\n1100,"), std::string::npos) << csv;
-  fs::remove(dir_ / "run.csv");
-  fs::remove(dir_ / "run.json");
-  ASSERT_EQ(Run("record run").code, 0);
+  ASSERT_EQ(Train("--out other").code, 0);
+  const std::string other = ReadFile(dir_ / "other.json");
+  for (const char* name : {"run.csv", "run.json", "other.csv", "other.json"}) {
+    fs::remove(dir_ / name);
+  }
+  ASSERT_EQ(Run("record run other").code, 0);
   EXPECT_EQ(ReadFile(dir_ / "run.csv"), csv);
   EXPECT_EQ(ReadFile(dir_ / "run.json"), json);
+  EXPECT_EQ(ReadFile(dir_ / "other.json"), other);
 }
 
 TEST_F(Program, WritesNetworkOutputs) {
@@ -329,6 +333,14 @@ TEST_F(Program, JobsRunThenDisappearThenSummarise) {
   EXPECT_NE(
       ReadFile(dir_ / "results/tiny/summary.csv").find("paper,InvertedPendulum-v2,ppo,1024,2,"),
       std::string::npos);
+  // Every experiment has a table of its own.
+  fs::copy(dir_ / "results/tiny", dir_ / "results/half", fs::copy_options::recursive);
+  fs::remove(dir_ / "results/half/paper/InvertedPendulum-v2/ppo/seed-001.json");
+  fs::remove(dir_ / "results/half/summary.csv");
+  ASSERT_EQ(Run("summary results/tiny results/half").code, 0);
+  for (const auto& [name, row] : {std::pair{"tiny", "ppo,1024,2,"}, {"half", "ppo,1024,1,"}}) {
+    EXPECT_NE(ReadFile(dir_ / "results" / name / "summary.csv").find(row), std::string::npos);
+  }
   // A damaged record does not count, and whoever lists runs says so.
   const std::string record = "results/tiny/paper/InvertedPendulum-v2/ppo/seed-001.json";
   WriteFileAtomically(dir_ / record, "{");
@@ -338,6 +350,7 @@ TEST_F(Program, JobsRunThenDisappearThenSummarise) {
     EXPECT_EQ(damaged.code, 0) << command;
     EXPECT_TRUE(damaged.err.starts_with(record + ": ")) << command << ": " << damaged.err;
     EXPECT_TRUE(damaged.err.ends_with("\n1 records refused\n")) << command << ": " << damaged.err;
+    EXPECT_EQ(damaged.out.find(" train "), std::string::npos) << "its run is not started again";
   }
 }
 

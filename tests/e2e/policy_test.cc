@@ -175,8 +175,9 @@ TEST_F(PolicyCommands, ExportedPoliciesActAsTheirRuns) {
       Run("eval --checkpoint x.safetensors --episodes 2 --seed 3 --trajectory steps.csv");
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ(outcome.out, Eval("--episodes 2 --seed 3"));
-  EXPECT_EQ(ReadMetadata(dir_ / "x.safetensors").at("config"),
-            ReadFile(dir_ / "run" / "config.toml"));
+  const Metadata metadata = ReadMetadata(dir_ / "x.safetensors");
+  EXPECT_EQ(metadata.at("config"), ReadFile(dir_ / "run" / "config.toml"));
+  EXPECT_EQ(metadata.at("total_steps"), "256");
   // Every number of the table is read back as it was: the returns are sums of its rewards.
   const CsvTable steps = ReadCsv(dir_ / "steps.csv");
   const Rollout expected(dir_ / "run" / "last.ckpt", "Reacher-v2", 2, /*sample=*/true, 3);
@@ -185,6 +186,9 @@ TEST_F(PolicyCommands, ExportedPoliciesActAsTheirRuns) {
     returns[std::size_t(steps.At(row, 0))] += steps.At(row, steps.Column("reward"));
   }
   EXPECT_EQ(returns, expected.returns);
+  EXPECT_EQ(Eval("--episodes 2 --seed 3 --action mean --trajectory steps.csv"),
+            Eval("--episodes 2 --seed 3 --action mean"))
+      << "writing the steps changes nothing";
 }
 
 TEST_F(PolicyCommands, ExportOfAForeignFileSaysHowToActWithIt) {

@@ -224,13 +224,17 @@ TEST(HumanoidStandup, HeightIsDividedByThePhysicsTimestep) {
 }
 
 TEST(Observations, ClipVelocitiesAtTen) {
-  TaskUnderTest task("Hopper-v2");
-  std::vector<double> qvel = task.AtRest();
-  qvel[0] = 50;
-  qvel[1] = -50;
-  task.ResetTo(task.Qpos0(), qvel);
-  EXPECT_EQ(task.obs[5], 10);
-  EXPECT_EQ(task.obs[6], -10);
+  for (const auto& [id, first] : {std::pair{"Hopper-v2", 5},  // entry of the first velocity
+                                  {"Walker2d-v2", 8},
+                                  {"InvertedDoublePendulum-v2", 5}}) {
+    TaskUnderTest task(id);
+    std::vector<double> qvel = task.AtRest();
+    qvel[0] = 50;
+    qvel[1] = -50;
+    task.ResetTo(task.Qpos0(), qvel);
+    EXPECT_EQ(task.obs[std::size_t(first)], 10) << id;
+    EXPECT_EQ(task.obs[std::size_t(first) + 1], -10) << id;
+  }
 }
 
 }  // namespace

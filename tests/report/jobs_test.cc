@@ -201,6 +201,8 @@ TEST_F(Jobs, QuoteWordsForTheShell) {
   JobQuery query = Query();
   query.program = "/a b/it's";
   EXPECT_EQ(ListJobs(query)[0].command.substr(0, 20), "'/a b/it'\\''s' train");
+  query.program = "~/it";  // a shell would put a home there
+  EXPECT_EQ(ListJobs(query)[0].command.substr(0, 12), "'~/it' train");
 }
 
 TEST_F(Jobs, RefuseALineBreakInAName) {
@@ -314,8 +316,9 @@ TEST_F(Jobs, ABadRecordIsRefusedAloneAndNeitherDoneNorLeft) {
     EXPECT_FALSE(jobs[bad].finished);
   }
   EXPECT_EQ(jobs[2].finished, RunStatus::kDone);
+  // Two of cheetah's 1M steps at 3600 s, three of pendulum's 0.3M: 10 440 s.
   EXPECT_TRUE(ToString(MeasureProgress(jobs), 1)
-                  .starts_with("8 runs: 1 done, 2 with a refused record, 5 left"))
+                  .starts_with("8 runs: 1 done, 2 with a refused record, 5 left, about 2.9 CPU"))
       << ToString(MeasureProgress(jobs), 1);
 }
 

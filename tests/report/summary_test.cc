@@ -98,6 +98,24 @@ TEST_F(Summary, CountsDivergedAndShortRunsApart) {
   EXPECT_NE(SummaryTable(rows).find("1 diverged, 1 short, 0 older"), std::string::npos);
 }
 
+TEST_F(Summary, ARunThatDivergesInItsLastUpdateHasItsReturn) {
+  Record("Hopper-v2", 0, 30000, "30000,7\n", RunStatus::kDiverged, 30000);
+  Record("Hopper-v2", 1, 30000, "20000,9\n", RunStatus::kDiverged, 29999);
+  const auto rows = Summarize(root_).rows;
+  EXPECT_EQ(rows[0].values, (std::vector<double>{7}));
+  EXPECT_EQ(rows[0].n_diverged, 1);
+}
+
+TEST_F(Summary, AShortenedPairEndsItsFirstTaskAtHalfOfItsSteps) {
+  Record("Cheetah", 0, 40000, "20000,1\n30000,2\n40000,3\n", RunStatus::kDone, 40000);
+  const auto rows = Summarize(root_).rows;
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].step, 20000);
+  EXPECT_EQ(rows[0].values, (std::vector<double>{1}));
+  EXPECT_EQ(rows[1].step, 40000);
+  EXPECT_EQ(rows[1].values, (std::vector<double>{3}));
+}
+
 TEST_F(Summary, LeavesOutRunsOfOlderRevisionsAndSaysSo) {
   // Revisions 1, 2, 1, 2: of the older two neither the returns nor the fewer steps count.
   Record("Hopper-v2", 0, 20000, "20000,100\n");

@@ -48,6 +48,17 @@ TEST(Tensorboard, EventsAreProtocolBuffers) {
             "\x15\0\0\0\xc0"s);  // 2: simple_value
 }
 
+TEST(Tensorboard, StepsTakeASecondByteFrom128On) {
+  const auto step = [](std::int64_t x) {  // up to the summary
+    const std::string event = ScalarEvent(0, x, "a", 0);
+    return event.substr(9, event.size() - 9 - 12);
+  };
+  EXPECT_EQ(step(0), "\x10\x00"s);
+  EXPECT_EQ(step(127), "\x10\x7f"s);
+  EXPECT_EQ(step(128), "\x10\x80\x01"s);
+  EXPECT_EQ(step(16384), "\x10\x80\x80\x01"s);
+}
+
 TEST(Tensorboard, EveryNumberOfARunIsAnEvent) {
   const TestFolder run;
   WriteFileAtomically(run / "episodes.csv", "step,return\n5,1.5\n9,-2\n");

@@ -168,6 +168,17 @@ TEST(VecEnv, TakesEveryShownObservationIntoTheNormaliserOnce) {
   EXPECT_DOUBLE_EQ(env.normalizer().count(), 1e-4 + 3 * 5);
 }
 
+TEST(VecEnv, CountsEveryEpisodeFromItsOwnStartHoweverTheOneBeforeEnded) {
+  VecEnv env = ThreeWorkers();
+  Transition t;
+  std::vector<Episode> episodes;
+  env.Reset();
+  for (int i = 0; i < 6; ++i) env.Step(Actions(), t, episodes);
+  std::vector<std::vector<int>> lengths(3);
+  for (const Episode& e : episodes) lengths[std::size_t(e.worker)].push_back(e.length);
+  EXPECT_EQ(lengths, (std::vector<std::vector<int>>{{2, 2, 2}, {3, 3}, {3, 3}}));
+}
+
 TEST(VecEnv, WritesARowAnEpisode) {
   VecEnv env = ThreeWorkers();
   Transition t;

@@ -183,6 +183,18 @@ TEST_F(Checkpoint, ChecksumCoversMetadataToo) {
   header["__metadata__"]["method"] = "other";
   Write(Join(header, data));
   EXPECT_THROW(ReadMetadata(path_), Error);
+  const Metadata all = {
+      {"task", "a"}, {"method", "b"}, {"config", "c"}, {"switches", "d"}, {"total_steps", "5"}};
+  SaveCheckpoint(path_, all, saved.algorithm, saved.Walk());
+  const auto [good, bytes] = Split(ReadFile(path_));
+  for (const auto& [key, value] : all) {
+    header = good;
+    header["__metadata__"][key] = value + "0";
+    Write(Join(header, bytes));
+    EXPECT_THROW(ReadMetadata(path_), Error) << key;
+  }
+  Write(Join(good, bytes));
+  EXPECT_EQ(ReadMetadata(path_).at("config"), "c");
 }
 
 /// A state with options and a counter.

@@ -262,6 +262,8 @@ TEST(ResolveRun, RefusesMistypedValues) {
   EXPECT_CONTAINS(MessageAbout("[algo.ppo]\nactivation = 'gelu'\n"), "'tanh'");
   EXPECT_CONTAINS(MessageAbout("[algo.ppo]\nactivation = 1\n"), "'tanh'");
   EXPECT_CONTAINS(MessageAbout("[algo.ppo]\nworkers = 0\n"), "whole number");
+  EXPECT_CONTAINS(MessageAbout("[algo.ppo]\nworkers = 2147483648\n"), "[1, 2147483647]");
+  EXPECT_CONTAINS(MessageAbout("[run]\neval_episodes = 4294967297\n"), "[1, 2147483647]");
   EXPECT_CONTAINS(MessageAbout("[run]\nsteps = 1.5\n"), "whole number");
   EXPECT_CONTAINS(MessageAbout("[run]\nseed = -1\n"), "whole number");
   RunRequest request;

@@ -26,6 +26,18 @@ TEST(Manifest, IsReadBackAsWritten) {
   }
 }
 
+TEST(Manifest, OfBeforeThereWereRevisionsIsOfTheFirst) {
+  const TestFolder dir;
+  Manifest manifest;
+  manifest.revision = 3;
+  WriteManifest(dir / "", manifest);
+  EXPECT_EQ(ReadManifest(dir / "")->revision, 3);
+  auto json = nlohmann::json::parse(ReadFile(dir / "manifest.json"));
+  json.erase("revision");
+  WriteFileAtomically(dir / "manifest.json", json.dump());
+  EXPECT_EQ(ReadManifest(dir / "")->revision, 1);
+}
+
 TEST(Manifest, NamesBuildAndMachine) {
   TestFolder dir;
   WriteManifest(dir / "", {});
