@@ -143,7 +143,8 @@ def claims_json(judged: Sequence[Judged], inputs: Inputs,
 def box(found: Mapping[str, Any], report: str = "results/REPORT.md") -> str:
     """The table of README.md, from claims.json."""
     runs, grid = found["runs_done"], found["runs_of_grid"]
-    lines = [f"{runs} of the grid's {grid} runs are done ({100 * runs / grid:.0f} %), so far:", "",
+    lines = [f"{runs} of {grid} runs are done ({100 * runs / grid:.0f} %): each method on each task "
+             "and pair, in both versions, with ten seeds. So far:", "",
              *(f"- {line}" for line in sentences(found)), "",
              "n belongs to the columns in their order: the seeds per method and task that the "
              "verdict rests on, with the tasks where only some decide it. For embeddings it is the "

@@ -86,7 +86,8 @@ class LedgerTest(unittest.TestCase):
             {"question": "Why?", "report": "why", "answers": {"released": "yes", "paper": "no"}}]}
         lines = ledger.box(found).splitlines()
         self.assertEqual(lines[:4], [
-            "640 of the grid's 2560 runs are done (25 %), so far:", "",
+            "640 of 2560 runs are done (25 %): each method on each task and pair, in both versions, "
+            "with ten seeds. So far:", "",
             "- **`released`**, the authors' code: of 1 claims 1 **holds** (c).",
             "- **`paper`**, the text: of 1 claims 1 **fails** (c)."])
         self.assertEqual(lines[-2:], [
