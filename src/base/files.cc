@@ -163,8 +163,13 @@ void WriteFileAtomically(const fs::path& path, std::string_view text,
   const fs::path target = FollowLinks(path), temporary = Temporary(target);
   {
     const Descriptor file(temporary, O_WRONLY | O_CREAT | O_TRUNC);
-    file.Write(text);
-    file.Sync();
+    try {
+      file.Write(text);
+      file.Sync();
+    } catch (const Error&) {  // of a full disk: what is written only takes room
+      ::unlink(temporary.c_str());
+      throw;
+    }
   }
   if (before_rename) before_rename();
   if (std::rename(temporary.c_str(), target.c_str()) != 0) {

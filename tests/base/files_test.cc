@@ -77,6 +77,15 @@ TEST_F(Files, ReplaceALongerLeftover) {
   EXPECT_EQ(ReadFile(dir_ / "x"), "new");
 }
 
+TEST_F(Files, LeaveNothingBehindOnAFullDisk) {
+  WriteFileAtomically(dir_ / "x", "old");
+  fs::create_symlink("/dev/full", dir_ / "x.tmp");
+  EXPECT_EQ(MessageOf([&] { WriteFileAtomically(dir_ / "x", "new"); }),
+            (dir_ / "x.tmp").string() + ": cannot write: No space left on device");
+  EXPECT_FALSE(fs::is_symlink(dir_ / "x.tmp"));
+  EXPECT_EQ(ReadFile(dir_ / "x"), "old");
+}
+
 TEST_F(Files, NameFileAndReasonWhenTheyCannotBeRead) {
   EXPECT_EQ(MessageOf([&] { ReadFile(dir_ / "none"); }),
             (dir_ / "none").string() + ": cannot open: No such file or directory");
