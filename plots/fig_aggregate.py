@@ -16,6 +16,7 @@ from plots.statistics import Scores
 from plots.style import INK, LOOKS, PAPER, Drawing, Margins, legend_above, main, new_figure, strip
 
 ORDER = {"authors": "authors' logs", "released": "ours, released", "paper": "ours, paper"}
+SPREAD = 0.6  # [rows] of the methods within a task's; from one to the next below the line
 LIMITS = (-1.0, 1.5)  # of what is shown
 TICKS = (-1, -0.5, 0, 0.5, 1, 1.5)
 NOTE = (
@@ -92,7 +93,7 @@ def _differences(panel: Axes, tasks: list[str], found: dict[str, Pairs],
         panel.text(LIMITS[1] + 0.08, len(tasks) - tasks.index(task), METHODS[rival], va="center",
                    fontsize=7)
     for place, (method, of_method) in enumerate(found.items()):
-        below, look = place / len(found), LOOKS[method]
+        below, look = SPREAD * place / len(found), LOOKS[method]
         counted = {id(x) for x, _ in pairs[method]}
         scores = Scores.of([(sample.final, rival.final) for sample, _, rival in of_method.values()])
         for (task, (sample, *_)), (mean, (low, high)) in zip(of_method.items(), scores.means()):
@@ -100,12 +101,12 @@ def _differences(panel: Axes, tasks: list[str], found: dict[str, Pairs],
                  look.marker, 4, id(sample.final) in counted)
         if pairs[method]:
             mean, (low, high) = Scores.of(pairs[method]).iqm()
-            _dot(panel, -below, mean, low, high, INK if method == OURS else look.color,
+            _dot(panel, -SPREAD * place, mean, low, high, INK if method == OURS else look.color,
                  look.marker, 6)
-            panel.text(LIMITS[1] + 0.08, -below, f"{mean:+.2f}", va="center", fontsize=7)
+            panel.text(LIMITS[1] + 0.08, -SPREAD * place, f"{mean:+.2f}", va="center", fontsize=7)
     panel.axvline(0, color=INK, linewidth=0.8)
     panel.axhline(0.5, color=INK, linewidth=0.5)
-    panel.set(xlim=LIMITS, ylim=(-0.6 - below, len(tasks) + 0.6),
+    panel.set(xlim=LIMITS, ylim=(-0.6 - SPREAD * place, len(tasks) + 0.6),
               yticks=range(len(tasks) + 1), yticklabels=["all tasks, IQM", *reversed(tasks)])
     panel.set_xlabel("difference [best rival's mean]")
 

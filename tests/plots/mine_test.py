@@ -90,9 +90,9 @@ class MineTest(unittest.TestCase):
                 for line in panel.lines if len(line.get_xdata()) == 1 and line.get_ydata()[0] > 0}
         row = float(len((*TASKS, *PAIRS)) - TASKS.index(TASK))
         self.assertEqual(dots, {LOOKS[OURS].color: [[0.5, row]],
-                                LOOKS["SAC"].color: [[0.5, row - 0.5]]})
+                                LOOKS["SAC"].color: [[0.5, row - 0.3]]})
         # The mean of a resample of 1 and 0 is each of them a quarter of the times.
-        bar, = (c for c in panel.collections if c.get_paths()[0].vertices[0, 1] == row - 0.5)
+        bar, = (c for c in panel.collections if c.get_paths()[0].vertices[0, 1] == row - 0.3)
         self.assertEqual(bar.get_paths()[0].vertices[:, 0].tolist(), [0, 1])
         # Option2Vec's runs are at 0.25 and 0.75, mine at 1 and 0.
         for method, shares in ((OURS, (1, 0.5, 0)), ("SAC", (0.5, 0.5, 0.5))):
