@@ -232,8 +232,8 @@ class OtherTest(unittest.TestCase):
             for what in ("option before", "height", "speed", "both")]))
 
     def test_options_coincide_with_phases_by_the_share_of_the_entropy(self):
-        # (bits - 0.1) / entropy: 0.5, 0.45, 0.11, 0.095; then 0.5 within the shuffles, and an option
-        # that acts nearly always.
+        # (bits - 0.1) / entropy: 0.5, 0.45, 0.11, 0.095; then 0.5 within the shuffles, and an
+        # option that acts nearly always.
         for bits, entropy, expected in ((0.6, 1, HOLDS), (1, 2, UNDECIDED), (0.32, 2, UNDECIDED),
                                         (0.29, 2, FAILS), (0.2, 0.2, FAILS), (0.9, 0.09, FAILS)):
             _, parts = self.phases("paper", ("Hopper-v2", bits, entropy))

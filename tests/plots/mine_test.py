@@ -78,7 +78,8 @@ class MineTest(unittest.TestCase):
         # Best rival 8: Option2Vec's 12 is 0.5 above it. Mine has 16 and 8: 12 in the mean, IQM of
         # 0 and 1 the same 0.5. It is above PPO, and yet no rival.
         with_reference(self.folder)
-        for method, final in (dict.fromkeys(RIVALS, [6, 6]) | {OURS: [10, 14], "ppo": [8, 8]}).items():
+        finals = dict.fromkeys(RIVALS, [6, 6]) | {OURS: [10, 14], "ppo": [8, 8]}
+        for method, final in finals.items():
             write_flat(self.folder, TASK, method, final)
         rows = [("SAC", TASK, seed, 1_000_000, ret) for seed, ret in ((0, 16), (1, 8))]
         mine.join([self.table(rows, "method,task,seed,step,return_20")])
