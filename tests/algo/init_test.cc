@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "algo/setup.h"
+#include "small_hyper.h"
 
 namespace o2v {
 namespace {
@@ -106,6 +107,35 @@ TEST(Init, EmbeddingsOfOptionsAreOrthonormal) {
   const auto algorithm = MakeRunAlgorithm(SmallConfig("option2vec", Fidelity::kPaper), Sizes(5, 3));
   const Mat& E = FindParam(*algorithm, "embed.W_o").value;  // (D, K), K <= D
   EXPECT_TRUE((E.transpose() * E).isIdentity(1e-5));
+}
+
+TEST(Init, TheInitialOptionNetHasAWidthOfItsOwn) {
+  const auto algorithm = MakeRunAlgorithm(
+      SmallConfig("option2vec", Fidelity::kPaper, {"hidden=8", "init_hidden=16"}), Sizes(5, 3));
+  const auto shape = [&](const char* name) {
+    const Mat& W = FindParam(*algorithm, name).value;
+    return std::pair(W.rows(), W.cols());
+  };
+  EXPECT_EQ(shape("init.0.W"), std::pair(Index(16), Index(5)));
+  EXPECT_EQ(shape("init.1.W"), std::pair(Index(4), Index(16)));
+  EXPECT_EQ(shape("action.body.1.W"), std::pair(Index(8), Index(8)));
+}
+
+TEST(Init, ActivationsAreTheTwoThatHaveANumber) {
+  AlgorithmInput in{.S = 5, .A = 3, .workers = 2, .switches = SwitchesFor(Fidelity::kPaper)};
+  for (const double number : {0, 1, 2, 7}) {
+    const Settings hyper = SmallHyper({{"activation", number}});
+    in.hyper = &hyper;
+    std::string message;
+    try {
+      MakeAlgorithm("ppo", in);
+    } catch (const ConfigError& e) {
+      message = e.what();
+    }
+    EXPECT_EQ(
+        message,
+        number < 2 ? "" : Concat("test: 'activation' is ", number, ", not 0 (tanh) or 1 (relu)"));
+  }
 }
 
 TEST(Init, AttentionIsXavierOverTheWholeInProjection) {

@@ -44,6 +44,15 @@ TEST(Softplus, IsLogOfOnePlusExp) {
   EXPECT_NEAR(y(2), std::log1p(std::exp(-1.0)), 1e-6);
 }
 
+TEST(Softplus, LiesAboveTheLineBelowTwenty) {
+  Mat y = Column({3, 6, 9});
+  Softplus(y);
+  // x + ln(1 + e^-x).
+  EXPECT_NEAR(y(0), 3.0485874, 1e-6);
+  EXPECT_NEAR(y(1), 6.0024757, 1e-6);
+  EXPECT_NEAR(y(2), 9.0001234, 2e-6);
+}
+
 TEST(Softplus, DoesNotOverflow) {
   Mat y = Column({21, 500, -500}), dy = Column({1, 1, 1});
   Softplus(y);
@@ -52,6 +61,21 @@ TEST(Softplus, DoesNotOverflow) {
   EXPECT_NEAR(dy(0), 1, 1e-6);
   EXPECT_EQ(dy(1), 1);
   EXPECT_EQ(dy(2), 0);
+}
+
+TEST(Activations, OfNoSamplesTouchNothing) {
+  Mat guarded = Mat::Constant(3, 2, 7);  // a block of no columns lies before the second
+  MatRef none = guarded.middleCols(1, 0);
+  for (const Activation g : {Activation::kTanh, Activation::kRelu}) {
+    BiasActivate(g, Mat::Ones(3, 1), none);
+    ActivationBackward(g, none, none);
+  }
+  Tanh(none);
+  Softplus(none);
+  SoftplusBackward(none, none);
+  Sigmoid(none);
+  SigmoidBackward(none, none);
+  EXPECT_EQ(guarded, Mat::Constant(3, 2, 7));
 }
 
 TEST(Sigmoid, IsAHalfAtZeroAndDoesNotOverflow) {

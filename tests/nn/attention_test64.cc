@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 
 #include "base/check.h"
 #include "nn/attention_block.h"
@@ -115,6 +116,29 @@ TEST(AttentionBlock, EqualsTheTextbook) {
   const Mat fed = (f.ffn1.W.value * hidden).colwise() + f.ffn1.b.value.col(0);
   const Mat t = TextbookNorm(f.ln_final, TextbookNorm(f.ln3, y + fed.cwiseProduct(m.after_ffn)));
   EXPECT_LT((cache.out - t).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+TEST(AttentionBlock, OfNoSamplesAddsNothingToTheGradients) {
+  Rng rng(5, "test");
+  AttentionBlock f("attention", "block", D, 2, F);
+  Randomize(f.Params(), rng);
+  for (Param* p : f.Params()) p->grad.setConstant(3);
+  const Mat E = RandomMat(D, K, rng), x(D, 0);
+  Mat dE = Mat::Constant(D, K, 5), dout(D, 0), dx(D, 0);
+  AttentionBlock::Masks m;
+  m.Resize(2 * K, D, F, 0);
+  m.Draw(0.2, rng);
+  MemoryAttention::Memory memory;
+  f.attention.Project(E, memory);
+  for (const AttentionBlock::Masks* masks : {&std::as_const(m), {}}) {
+    AttentionBlock::Cache cache;
+    f.Forward(x, memory, masks, cache);
+    EXPECT_EQ(cache.out.rows(), D);
+    EXPECT_EQ(cache.out.cols(), 0);
+    f.Backward(x, E, memory, masks, cache, dout, dx, dE);
+  }
+  for (const Param* p : f.Params()) EXPECT_TRUE((p->grad.array() == 3).all()) << p->name;
+  EXPECT_EQ(dE, Mat::Constant(D, K, 5));
 }
 
 TEST(AttentionBlock, MasksOfOnesChangeNothing) {

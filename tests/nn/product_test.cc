@@ -19,8 +19,8 @@ namespace {
 
 using Form = void (*)(const ConstMatRef&, const ConstMatRef&, MatRef);
 
-/// Strips of 8, 2, 1 and half a register, tiles of 1 to 8 columns, and what is left of each.
-constexpr Index kSizes[] = {1,  2,  3,  4,  5,  6,  7,  8,  9,  12, 15,
+/// None; strips of 8, 2, 1 and half a register, tiles of 1 to 8 columns, and what is left of each.
+constexpr Index kSizes[] = {0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  12, 15,
                             16, 17, 20, 24, 25, 30, 33, 50, 64, 70, 130};
 constexpr Index kDepths[] = {0, 1, 2, 3, 4, 17, 40, 127, 128, 129, 300};
 
