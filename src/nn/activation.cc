@@ -57,6 +57,7 @@ void ActivationBackward(Activation g, const ConstMatRef& y, MatRef dy) {
 }
 
 void Softplus(MatRef y) {
+  if (y.size() == 0) return;  // none is the largest
   auto x = Flat(y);
   // max(x, 0) + ln(1 + e^{-|x|}) does not overflow.
   const auto smooth = x.max(0) + (-x.abs()).exp().log1p();

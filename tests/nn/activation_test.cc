@@ -75,6 +75,10 @@ TEST(Activations, OfNoSamplesTouchNothing) {
   SoftplusBackward(none, none);
   Sigmoid(none);
   SigmoidBackward(none, none);
+  Mat nowhere(3, 0);  // has no memory
+  Softplus(nowhere);
+  Sigmoid(nowhere);
+  Tanh(nowhere);
   EXPECT_EQ(guarded, Mat::Constant(3, 2, 7));
 }
 
