@@ -9,6 +9,7 @@
 #include <charconv>
 #include <cstdio>
 #include <optional>
+#include <random>
 #include <system_error>
 
 #include "base/check.h"
@@ -33,8 +34,10 @@ auto Uninterrupted(Call&& call) {
 /// A file descriptor that closes itself.
 class Descriptor {
  public:
-  Descriptor(const fs::path& path, int flags)
-      : path_(path),
+  Descriptor(const fs::path& path, int flags) : Descriptor(path, flags, path) {}
+  /// `name`: what messages call the file.
+  Descriptor(const fs::path& path, int flags, const fs::path& name)
+      : name_(name),
         fd_(Uninterrupted([&] { return ::open(path.c_str(), flags | O_CLOEXEC, 0644); })) {
     if (fd_ < 0) Fail("cannot open");
   }
@@ -43,16 +46,16 @@ class Descriptor {
   Descriptor& operator=(const Descriptor&) = delete;
 
   int fd() const { return fd_; }
-  void Write(std::string_view text) const { WriteAll(fd_, path_.string(), text); }
+  void Write(std::string_view text) const { WriteAll(fd_, name_.string(), text); }
   void Sync() const {
     if (Uninterrupted([&] { return ::fsync(fd_); }) != 0) Fail("cannot write to the disk");
   }
   [[noreturn]] void Fail(std::string_view what) const {
-    throw Error(Concat(path_.string(), ": ", what, ": ", Reason()));
+    throw Error(Concat(name_.string(), ": ", what, ": ", Reason()));
   }
 
  private:
-  fs::path path_;
+  fs::path name_;
   int fd_;
 };
 
@@ -74,7 +77,43 @@ fs::path FollowLinks(fs::path path) {
   return path;
 }
 
-fs::path Temporary(fs::path path) { return path += ".tmp"; }
+/// Where the text of a file waits until it is whole: a new file of a name that no other process
+/// has, beside the one that it is to replace. Without Rename it goes with the object.
+class Temporary {
+ public:
+  explicit Temporary(const fs::path& target)
+      : target_(target),
+        path_(NewName(target)),
+        file_(path_, O_WRONLY | O_CREAT | O_EXCL, target) {}
+  ~Temporary() {
+    if (!renamed_) ::unlink(path_.c_str());
+  }
+  Temporary(const Temporary&) = delete;
+  Temporary& operator=(const Temporary&) = delete;
+
+  void Write(std::string_view text) const {
+    file_.Write(text);
+    file_.Sync();
+  }
+  void Rename() {
+    if (std::rename(path_.c_str(), target_.c_str()) != 0) {
+      throw Error(Concat(target_.string(), ": cannot replace: ", Reason()));
+    }
+    renamed_ = true;
+  }
+
+ private:
+  /// Process numbers would not do: machines that share a folder have the same ones.
+  static fs::path NewName(fs::path path) {
+    char digits[kTemporaryEnding + 1];
+    std::snprintf(digits, sizeof digits, ".%08x.tmp", std::random_device()());
+    return path += digits;
+  }
+
+  fs::path target_, path_;
+  Descriptor file_;
+  bool renamed_ = false;
+};
 
 /// The number of an open descriptor that a path such as /dev/stdout stands for. To open the path
 /// would start at the beginning of a file that other output has gone to.
@@ -118,12 +157,10 @@ fs::path FolderPath(const fs::path& dir) {
 void RequireWritable(const fs::path& path) {
   try {
     if (IsStream(path)) return;
-    const fs::path target = FollowLinks(path), temporary = Temporary(target);
+    const fs::path target = FollowLinks(path);
     std::error_code error;
     if (fs::is_directory(target, error)) throw Error(path.string() + ": is a folder");
-    const bool there = fs::exists(temporary, error);
-    const Descriptor file(temporary, O_WRONLY | O_CREAT);
-    if (!there) fs::remove(temporary);
+    const Temporary file(target);
   } catch (const std::exception& e) {
     throw ConfigError(e.what());
   }
@@ -134,6 +171,13 @@ bool IsStream(const fs::path& path) {
   const fs::file_status status = fs::status(path, error);
   return DescriptorNumber(path) ||
          (fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status));
+}
+
+bool IsTemporary(const fs::path& path) {
+  const std::string name = path.filename();
+  if (name.size() <= kTemporaryEnding || !name.ends_with(".tmp")) return false;
+  const std::string ending = name.substr(name.size() - kTemporaryEnding);
+  return ending[0] == '.' && ending.find_first_not_of("0123456789abcdef", 1) == ending.rfind('.');
 }
 
 std::string ReadFile(const fs::path& path) {
@@ -160,21 +204,11 @@ void WriteFileAtomically(const fs::path& path, std::string_view text,
                          const std::function<void()>& before_rename) {
   if (const auto fd = DescriptorNumber(path)) return WriteAll(*fd, path.string(), text);
   if (IsStream(path)) return Descriptor(path, O_WRONLY).Write(text);
-  const fs::path target = FollowLinks(path), temporary = Temporary(target);
-  {
-    const Descriptor file(temporary, O_WRONLY | O_CREAT | O_TRUNC);
-    try {
-      file.Write(text);
-      file.Sync();
-    } catch (const Error&) {  // of a full disk: what is written only takes room
-      ::unlink(temporary.c_str());
-      throw;
-    }
-  }
+  const fs::path target = FollowLinks(path);
+  Temporary file(target);
+  file.Write(text);
   if (before_rename) before_rename();
-  if (std::rename(temporary.c_str(), target.c_str()) != 0) {
-    throw Error(Concat(path.string(), ": cannot replace: ", Reason()));
-  }
+  file.Rename();
   SyncFolder(target.parent_path());
 }
 

@@ -27,11 +27,17 @@ bool IsStream(const std::filesystem::path& path);
 /// The bytes of a file. Throws Error naming the file and the system's reason.
 std::string ReadFile(const std::filesystem::path& path);
 
-/// Replaces a file so that it is always whole: the text goes to `<path>.tmp`, to the disk, is
-/// renamed to `path`, and the folder goes to the disk. `before_rename`, where given, is called
-/// before that: the moment at which the tests of killed runs strike. A link stays, and the file
-/// that it leads to is replaced; a device or a pipe is written into. Throws Error naming the file
-/// and the system's reason.
+/// Bytes that ".<8 digits>.tmp" adds to the name of a file that is not whole yet.
+inline constexpr std::size_t kTemporaryEnding = sizeof ".01234567.tmp" - 1;
+/// True for a name with such an ending. Only a process that was killed leaves the file behind.
+bool IsTemporary(const std::filesystem::path& path);
+
+/// Replaces a file so that it is always whole, also when several processes write it at once: the
+/// text goes to a temporary file of the process's own, to the disk, is renamed to `path`, and the
+/// folder goes to the disk. `before_rename`, where given, is called before the rename: the moment
+/// at which the tests of killed runs strike. A link stays, and the file that it leads to is
+/// replaced; a device or a pipe is written into. Throws Error naming the file and the system's
+/// reason.
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view text,
                          const std::function<void()>& before_rename = {});
 

@@ -115,13 +115,7 @@ void Video::Finish() {
   if (!WIFEXITED(status_) || WEXITSTATUS(status_) != 0) Fail();
   const std::string film = ReadFile(Concat("/proc/self/fd/", film_));
   if (film.empty()) Fail();
-  try {
-    WriteFileAtomically(path_, film);
-  } catch (const Error&) {  // as on a full disk
-    std::error_code ignored;
-    std::filesystem::remove(path_.string() + ".tmp", ignored);
-    throw;
-  }
+  WriteFileAtomically(path_, film);
 }
 
 void Video::Wait() {

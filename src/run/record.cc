@@ -258,7 +258,7 @@ std::optional<RecordHead> FindRecord(const fs::path& dir, const std::string& con
 void RequireRecordPlace(const fs::path& dir, const std::string& config, bool begun) {
   constexpr std::size_t kLongestName = 255;  // [bytes] of most file systems
   const fs::path json = RecordPath(dir, ".json"), csv = RecordPath(dir, ".csv");
-  const std::size_t longest = json.filename().string().size() + sizeof ".tmp" - 1;
+  const std::size_t longest = json.filename().string().size() + kTemporaryEnding;
   if (longest > kLongestName) {
     throw ConfigError(Concat(dir.string(), ": the name of its record would have ", longest,
                              " bytes, more than ", kLongestName));

@@ -63,7 +63,7 @@ bool PrepareFolder(const fs::path& dir, const std::string& config, bool resume,
   const bool begun = fs::exists(path);
   if (!begun) {
     for (const auto& entry : fs::directory_iterator(dir)) {
-      if (entry.path().filename() != "config.toml.tmp") {
+      if (!IsTemporary(entry.path())) {
         throw ConfigError(Concat(dir.string(), ": contains ", entry.path().filename().string(),
                                  " but no config.toml: not the folder of a run"));
       }
@@ -79,6 +79,9 @@ bool PrepareFolder(const fs::path& dir, const std::string& config, bool resume,
   if (begun) RequireSameConfig(path, config);
   RequireRecordPlace(dir, config, begun);
   RequireWritable(RecordPath(dir, ".json"));
+  for (const auto& entry : fs::directory_iterator(dir)) {  // of processes that were killed
+    if (IsTemporary(entry.path())) fs::remove(entry.path());
+  }
   if (!begun) WriteFileAtomically(path, config);
   return ended;
 }

@@ -132,9 +132,9 @@ TEST(Init, ActivationsAreTheTwoThatHaveANumber) {
     } catch (const ConfigError& e) {
       message = e.what();
     }
-    EXPECT_EQ(
-        message,
-        number < 2 ? "" : Concat("test: 'activation' is ", number, ", not 0 (tanh) or 1 (relu)"));
+    EXPECT_EQ(message, number < 2
+                           ? ""
+                           : Concat("activation: ", number, " is neither 0 (tanh) nor 1 (relu)"));
   }
 }
 

@@ -2,13 +2,16 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <functional>
+#include <vector>
 
 #include "base/check.h"
 #include "test_folder.h"
@@ -41,6 +44,14 @@ namespace fs = std::filesystem;
 
 class Files : public testing::Test {
  protected:
+  std::vector<fs::path> Temporaries() const {
+    std::vector<fs::path> found;
+    for (const auto& entry : fs::directory_iterator(dir_.path())) {
+      if (IsTemporary(entry.path())) found.push_back(entry.path());
+    }
+    return found;
+  }
+
   TestFolder dir_;
 };
 
@@ -65,25 +76,62 @@ TEST_F(Files, StayWholeUntilTheRename) {
   WriteFileAtomically(dir_ / "x", "old");
   WriteFileAtomically(dir_ / "x", "new", [&] {
     EXPECT_EQ(ReadFile(dir_ / "x"), "old");
-    EXPECT_EQ(ReadFile(dir_ / "x.tmp"), "new");
+    const fs::path waiting = Temporaries().at(0);
+    EXPECT_TRUE(waiting.filename().string().starts_with("x."));
+    EXPECT_EQ(ReadFile(waiting), "new");
   });
   EXPECT_EQ(ReadFile(dir_ / "x"), "new");
-  EXPECT_FALSE(fs::exists(dir_ / "x.tmp"));
+  EXPECT_TRUE(Temporaries().empty());
 }
 
-TEST_F(Files, ReplaceALongerLeftover) {
-  WriteFileAtomically(dir_ / "x.tmp", "left over by a killed run");
+TEST_F(Files, WrittenByTwoAtOnceAreOneOfTheTexts) {
+  const std::string first(100, '1'), second(50, '2');
+  WriteFileAtomically(dir_ / "x", first, [&] {
+    WriteFileAtomically(dir_ / "x", second, [&] {
+      const std::vector<fs::path> waiting = Temporaries();
+      ASSERT_EQ(waiting.size(), 2u);
+      EXPECT_EQ(ReadFile(waiting[0]).size() + ReadFile(waiting[1]).size(), 150u);
+    });
+    EXPECT_EQ(ReadFile(dir_ / "x"), second);
+  });
+  EXPECT_EQ(ReadFile(dir_ / "x"), first);
+  EXPECT_TRUE(Temporaries().empty());
+}
+
+TEST_F(Files, AreNeverWrittenThroughANameThatIsTaken) {
+  AppendToFile(dir_ / "mine", "kept");
+  fs::create_symlink("mine", dir_ / "x.tmp");
   WriteFileAtomically(dir_ / "x", "new");
-  EXPECT_EQ(ReadFile(dir_ / "x"), "new");
+  EXPECT_EQ(ReadFile(dir_ / "mine"), "kept");
 }
 
-TEST_F(Files, LeaveNothingBehindOnAFullDisk) {
-  WriteFileAtomically(dir_ / "x", "old");
-  fs::create_symlink("/dev/full", dir_ / "x.tmp");
-  EXPECT_EQ(MessageOf([&] { WriteFileAtomically(dir_ / "x", "new"); }),
-            (dir_ / "x.tmp").string() + ": cannot write: No space left on device");
-  EXPECT_FALSE(fs::is_symlink(dir_ / "x.tmp"));
-  EXPECT_EQ(ReadFile(dir_ / "x"), "old");
+TEST_F(Files, LeaveNothingBehindWhenTheyFail) {
+  const auto fail = [] { throw Error("stopped"); };
+  EXPECT_THROW(WriteFileAtomically(dir_ / "x", "text", fail), Error);
+  struct rlimit before {};
+  ::getrlimit(RLIMIT_FSIZE, &before);
+  const rlimit ten{10, before.rlim_max};
+  ::signal(SIGXFSZ, SIG_IGN);
+  ::setrlimit(RLIMIT_FSIZE, &ten);
+  const std::string message = MessageOf([&] { WriteFileAtomically(dir_ / "x", "eleven byte"); });
+  ::setrlimit(RLIMIT_FSIZE, &before);
+  EXPECT_EQ(message, (dir_ / "x").string() + ": cannot write: File too large");
+  EXPECT_TRUE(fs::is_empty(dir_.path()));
+}
+
+TEST_F(Files, CanBeReadByWhomTheMaskAllows) {
+  const mode_t before = ::umask(027);
+  WriteFileAtomically(dir_ / "x", "text");
+  ::umask(before);
+  EXPECT_EQ(fs::status(dir_ / "x").permissions(), fs::perms(0640));
+}
+
+TEST_F(Files, ThatAreNotWholeAreKnownByTheirNames) {
+  EXPECT_TRUE(IsTemporary("run/last.ckpt.0189abef.tmp"));
+  for (const char* name : {"last.ckpt.tmp", "last.ckpt.0189abe.tmp", "last.ckpt.0189abeg.tmp",
+                           "last.ckpt_0189abef.tmp", ".0189abef.tmp", "last.ckpt.0189abef.csv"}) {
+    EXPECT_FALSE(IsTemporary(name)) << name;
+  }
 }
 
 TEST_F(Files, NameFileAndReasonWhenTheyCannotBeRead) {
@@ -95,10 +143,11 @@ TEST_F(Files, NameFileAndReasonWhenTheyCannotBeRead) {
 
 TEST_F(Files, NameFileAndReasonWhenTheyCannotBeWritten) {
   EXPECT_EQ(MessageOf([&] { WriteFileAtomically(dir_ / "none" / "x", ""); }),
-            (dir_ / "none" / "x.tmp").string() + ": cannot open: No such file or directory");
+            (dir_ / "none" / "x").string() + ": cannot open: No such file or directory");
   fs::create_directories(dir_ / "x" / "y");
   EXPECT_EQ(MessageOf([&] { WriteFileAtomically(dir_ / "x", ""); }),
             (dir_ / "x").string() + ": cannot replace: Is a directory");
+  EXPECT_TRUE(Temporaries().empty());
 }
 
 TEST_F(Files, NameFileAndReasonWhenTheyCannotBeSynced) {
@@ -188,9 +237,9 @@ TEST_F(Files, CanBeAskedWhetherTheyCanBeWritten) {
   EXPECT_EQ(std::distance(fs::directory_iterator(dir_ / ""), fs::directory_iterator()), 1);
   EXPECT_THROW(RequireWritable(dir_ / ""), ConfigError);
   EXPECT_THROW(RequireWritable("/proc/o2v.csv"), ConfigError);
-  RequireWritable(dir_ / std::string(251, 'n'));
-  EXPECT_EQ(MessageOf([&] { RequireWritable(dir_ / std::string(252, 'n')); }),
-            (dir_ / std::string(252, 'n')).string() + ".tmp: cannot open: File name too long");
+  RequireWritable(dir_ / std::string(242, 'n'));
+  EXPECT_EQ(MessageOf([&] { RequireWritable(dir_ / std::string(243, 'n')); }),
+            (dir_ / std::string(243, 'n')).string() + ": cannot open: File name too long");
 }
 
 TEST_F(Files, FoldersHaveOneName) {

@@ -363,8 +363,8 @@ class OtherTest(unittest.TestCase):
         # Shares of noise differ by points from run to run: with one degree of freedom the interval
         # reaches far beyond 5 points on both sides.
         rng = np.random.default_rng(13)
-        effects = {Path(f"Hopper-v2/option2vec/seed-{i}"): rng.normal(size=(6, 3))
-                   for i in range(2)}
+        effects = {Path(f"results/interpret/paper/Hopper-v2/option2vec/seed-00{i}.csv"):
+                   rng.normal(size=(6, 3)) for i in range(2)}
         self.assertEqual(judged("q4", Evidence("paper", {}, effects=effects))[0], UNDECIDED)
 
     def test_the_authors_logs_say_what_is_known_of_them(self):

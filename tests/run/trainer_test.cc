@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <sstream>
 #include <tuple>
 
@@ -114,7 +115,10 @@ TEST_F(Trainer, ChecksPointsAtTheFirstBoundaryAfterEachMultipleAndAtTheEnd) {
   std::vector<std::int64_t> steps;
   RunHooks hooks;
   hooks.before_rename = [&] {
-    steps.push_back(std::stoll(ReadMetadata(dir_ / "run" / "last.ckpt.tmp").at("total_steps")));
+    for (const auto& entry : fs::directory_iterator(dir_ / "run")) {
+      if (!IsTemporary(entry.path())) continue;
+      steps.push_back(std::stoll(ReadMetadata(entry.path()).at("total_steps")));
+    }
   };
   Start("run", hooks);
   EXPECT_EQ(steps, (std::vector<std::int64_t>{50, 90, 140, 180, 200}));
@@ -286,13 +290,31 @@ TEST_F(Trainer, LeavesSomebodysFilesBesideTheFolderAlone) {
 }
 
 TEST_F(Trainer, RefusesNamesThatItsRecordHasNoRoomFor) {
-  const std::string fits(246, 'n');  // + ".json.tmp" is 255
+  const std::string fits(237, 'n');  // + ".json.01234567.tmp" is 255
   EXPECT_EQ(Start(fits), RunStatus::kDone);
   EXPECT_TRUE(fs::exists(dir_ / (fits + ".json")));
   EXPECT_EQ(Refused([&] { Start(fits + "n"); }),
             (dir_ / (fits + "n")).string() +
                 ": the name of its record would have 256 bytes, more than 255");
   EXPECT_FALSE(fs::exists(dir_ / (fits + "n")));
+}
+
+TEST_F(Trainer, RemovesWhatAKilledProcessLeftInItsFolderAndNothingElse) {
+  fs::create_directory(dir_ / "run");
+  AppendToFile(dir_ / "run" / "config.toml.0123abcd.tmp", "[run]");
+  RunHooks hooks;
+  hooks.stop = [] { return true; };
+  Start("run", hooks);
+  AppendToFile(dir_ / "run" / "last.ckpt.89ef4567.tmp", "half of it");
+  AppendToFile(dir_ / "run" / "notes.tmp", "mine");
+  EXPECT_EQ(Resume("run"), RunStatus::kDone);
+  std::set<std::string> names;
+  for (const auto& entry : fs::directory_iterator(dir_ / "run")) {
+    names.insert(entry.path().filename());
+  }
+  EXPECT_EQ(names,
+            (std::set<std::string>{"config.toml", "episodes.csv", "evals.csv", "last.ckpt",
+                                   "manifest.json", "notes.tmp", "timing.csv", "updates.csv"}));
 }
 
 TEST_F(Trainer, SaysWhyAFolderCannotBeLocked) {
@@ -366,6 +388,24 @@ TEST_F(Trainer, NamesTheLineInWhichTheConfigDiffers) {
             Concat((dir_ / "run" / "config.toml").string(), ":",
                    1 + std::count(before.begin(), before.end(), '\n'),
                    ": this run was started with 'steps = 200', not 'steps = 300'"));
+}
+
+TEST_F(Trainer, NamesALineThatWasAddedToTheConfigOrIsGone) {
+  RunHooks hooks;
+  hooks.stop = [] { return true; };
+  Start("run", hooks);
+  const fs::path path = dir_ / "run" / "config.toml";
+  const std::string text = ReadFile(path);
+  const auto lines = std::count(text.begin(), text.end(), '\n');
+  AppendToFile(path, "# mine\n");
+  EXPECT_EQ(Refused([&] { Resume("run"); }),
+            Concat(path.string(), ":", lines + 1,
+                   ": this run was started with '# mine', not '(nothing)'"));
+  const std::size_t last = text.rfind('\n', text.size() - 2) + 1;
+  WriteFileAtomically(path, text.substr(0, last));
+  EXPECT_EQ(Refused([&] { Resume("run"); }),
+            Concat(path.string(), ":", lines, ": this run was started with '(nothing)', not '",
+                   text.substr(last, text.size() - last - 1), "'"));
 }
 
 TEST_F(Trainer, RefusesAFolderOfOtherThings) {
