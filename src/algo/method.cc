@@ -88,7 +88,7 @@ double Method::Step(int stage) {
 
 Activation ReadActivation(const Settings& settings) {
   const int g = settings.Int("activation");
-  Check(g <= 1, "activation: ", g, " is neither 0 (tanh) nor 1 (relu)");
+  if (g > 1) throw ConfigError(Concat("activation: ", g, " is neither 0 (tanh) nor 1 (relu)"));
   return g == 0 ? Activation::kTanh : Activation::kRelu;
 }
 
