@@ -516,7 +516,7 @@ CLAIMS = (
           f"(entropy below {ONE_OPTION:.1f} bit); on most of the tasks. One policy a task and "
           "fidelity, seed 0, five episodes: it is a statement about these policies, without an "
           "interval over seeds, and the bounds were chosen when the first of them were known. "
-          "What lasts tells a little about whatever else lasts, so that a small share is no "
+          "Any two slowly changing signals share some information, so that a small share is no "
           "evidence. The option before is shown beside it.",
           len(QUANTITIES) // 2 + 1, _each(tuple(QUANTITIES), _coincides)),
     Claim("q5", "Q5, Fig. 7", "Option durations grow, on all ten tasks",

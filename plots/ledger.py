@@ -140,15 +140,28 @@ def claims_json(judged: Sequence[Judged], inputs: Inputs,
             for q, parts in answers]}
 
 
+def in_short(found: Mapping[str, Any]) -> str:
+    """Whether the paper replicates, in a sentence."""
+    words = {s: [c["verdicts"][s]["word"] for c in found["claims"]] for s in SOURCES}
+    more_fail = {words[s].count(FAILS) > words[s].count(HOLDS) for s in SOURCES[1:]}
+    answer = ("**Mostly not, so far**: in both versions more claims fail than hold"
+              if more_fail == {True} else
+              "**Mostly, so far**: in neither version more claims fail than hold"
+              if more_fail == {False} else "**In part, so far**: the two versions differ")
+    against = [c["short"] for c in found["claims"] if c["verdicts"]["authors"]["word"] == FAILS]
+    logs = f", and the authors' own logs contradict {len(against)} ({'; '.join(against)})"
+    return answer + (logs if against else "") + "."
+
+
 def box(found: Mapping[str, Any], report: str = "results/REPORT.md") -> str:
     """The table of README.md, from claims.json."""
     runs, grid = found["runs_done"], found["runs_of_grid"]
-    lines = [f"{runs} of {grid} runs are done ({100 * runs / grid:.0f} %): each method on each task "
-             "and pair, in both versions, with ten seeds. So far:", "",
+    lines = [f"{in_short(found)} {runs} of {grid} runs are done ({100 * runs / grid:.0f} %): each "
+             "method on each task and pair, in both versions, with ten seeds. So far:", "",
              *(f"- {line}" for line in sentences(found)), "",
-             "n belongs to the columns in their order: the seeds per method and task that the "
-             "verdict rests on, with the tasks where only some decide it. For embeddings it is the "
-             "number of runs, over all tasks. Words in quotation marks are the paper's.", "",
+             "n lists, for authors' logs · `released` · `paper`, the seeds per method behind the "
+             "verdict. Tasks in parentheses, or their number, are those that decide it. For "
+             "embeddings n is the number of runs. Words in quotation marks are the paper's.", "",
              "| claim of the paper | " + " | ".join(NAMES[s] for s in SOURCES) + " | n |",
              "|---|---|---|---|---|"]
     for claim in found["claims"]:
