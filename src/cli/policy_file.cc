@@ -28,6 +28,14 @@ LoadedPolicy LoadPolicyFile(const std::string& checkpoint, RunRequest request) {
   const EnvOptions options{.contact_forces = config.switches.contact_forces};
   std::unique_ptr<Env> env = MakeEnv(SplitTasks(task.value_or(config.task)).back(), options);
   const EnvSpec spec = env->Spec();
+  if (task && request.config) {
+    const EnvSpec own = MakeEnv(SplitTasks(config.task).back(), options)->Spec();
+    if (spec.S != own.S || spec.A != own.A) {
+      throw ConfigError(Concat(checkpoint, ": trained on ", own.id, ", which has ", own.S,
+                               " observations and ", own.A, " actions; ", spec.id, " has ", spec.S,
+                               " and ", spec.A));
+    }
+  }
   LoadedPolicy policy{config, std::move(env), MakeRunAlgorithm(config, spec), Normalizer(spec.S)};
   LoadPolicy(checkpoint, *policy.algorithm, policy.normalizer);
   return policy;

@@ -143,6 +143,16 @@ TEST_F(PolicyCommands, EvalIsOnTheLastTaskOfAPairUnlessToldOtherwise) {
   ExpectPrinted(Eval("--episodes 1 --seed 2 --task dm-cheetah-run"), first);
 }
 
+TEST_F(PolicyCommands, ATaskOfOtherSizesIsRefusedByItsName) {
+  TrainRun("--task Hopper-v2 --algo ppo --steps 64");
+  const Outcome outcome = Run("eval --checkpoint run/last.ckpt --task HalfCheetah-v2");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_NE(outcome.err.find("run/last.ckpt: trained on Hopper-v2, which has 11 observations and 3 "
+                             "actions; HalfCheetah-v2 has 17 and 6"),
+            std::string::npos)
+      << outcome.err;
+}
+
 TEST_F(PolicyCommands, DropoutIsOff) {
   TrainRun("--task Reacher-v2 --algo option2vec --fidelity released --steps 256");
   const CsvTable states{
