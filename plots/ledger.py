@@ -143,11 +143,11 @@ def claims_json(judged: Sequence[Judged], inputs: Inputs,
 def in_short(found: Mapping[str, Any]) -> str:
     """Whether the paper replicates, in a sentence."""
     words = {s: [c["verdicts"][s]["word"] for c in found["claims"]] for s in SOURCES}
-    more_fail = {words[s].count(FAILS) > words[s].count(HOLDS) for s in SOURCES[1:]}
+    surplus = [words[s].count(HOLDS) - words[s].count(FAILS) for s in SOURCES[1:]]
     answer = ("**Mostly not, so far**: in both versions more claims fail than hold"
-              if more_fail == {True} else
-              "**Mostly, so far**: in neither version more claims fail than hold"
-              if more_fail == {False} else "**In part, so far**: the two versions differ")
+              if max(surplus) < 0 else
+              "**Mostly, so far**: in both versions more claims hold than fail"
+              if min(surplus) > 0 else "**Open, so far**: neither most claims hold nor most fail")
     against = [c["short"] for c in found["claims"] if c["verdicts"]["authors"]["word"] == FAILS]
     logs = f", and the authors' own logs contradict {len(against)} ({'; '.join(against)})"
     return answer + (logs if against else "") + "."

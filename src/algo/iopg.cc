@@ -381,11 +381,12 @@ void Iopg::BackwardReleased(std::span<const int> init, Index n) {
     h.dm = kappa * p_over_c + h.dlater.array();
     h.dlog_p.col(t) = kappa * h.m.col(t).array() * p_over_c;
     PassBackward(h.w.col(t), init[std::size_t(t)], t);
-    // w_t = softmax(ln m_{t-1} + ln p_t).
+    // w_t = softmax(ln m_{t-1} + ln p_t). No m is 0: Eigen's exp of floats, in whole registers as
+    // for the K x kBlock probabilities here, gives 1e-38 at least.
     const auto w = h.w.col(t).array();
     const double mean = (w * h.dweights.array()).sum();
     h.dlog_p.col(t).array() += w * (h.dweights.array() - mean);
-    if (t > 0) h.dlater = w * (h.dweights.array() - mean) / h.m.col(t - 1).array();  // m > 0
+    if (t > 0) h.dlater = w * (h.dweights.array() - mean) / h.m.col(t - 1).array();
   }
 }
 

@@ -138,10 +138,10 @@ void Option2Vec::Serialize(StateVisitor& v) {
   if (frozen && !frozen_) StartFreeze();
 }
 
-/// o2v_freeze  what leaves the option stage's graph  its gradient        what still moves it
-/// paper       W_o                                   zero                nothing: it is held
-/// released    W_o                                   zero                momentum, with `adam_idle`
-/// policy      the whole option policy               none is computed    momentum, with `adam_idle`
+/// o2v_freeze  leaves the option stage's graph  its gradient  what still moves it
+/// paper       W_o                              zero          nothing: it is held
+/// released    W_o                              zero          momentum, by adam_idle = released
+/// policy      the whole option policy          not computed  momentum, likewise
 /// none        nothing
 void Option2Vec::StartFreeze() {
   if (switches_.o2v_freeze == Freeze::kNone) return;
